@@ -12,6 +12,7 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from typing import Any
 
     from pkmcal import export as export
+    from pkmcal import readings as readings
     from pkmcal import screw as screw
     from pkmcal import trajectory as trajectory
     from pkmcal.arms.arm import SerialArm as SerialArm
@@ -158,7 +159,7 @@ _HOMES = {
     "view.show": ("show",),
 }
 _HOME_OF = {name: f"pkmcal.{home}" for home, names in _HOMES.items() for name in names}
-_MODULES = ("export", "screw", "trajectory")
+_MODULES = ("export", "readings", "screw", "trajectory")
 
 __all__ = sorted((*_HOME_OF, *_MODULES))
 

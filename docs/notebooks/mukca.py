@@ -26,10 +26,9 @@ rows = {name: np.loadtxt(f"{file}.csv", delimiter=",") for name, file in files.i
 sockets = np.repeat(list(rows), [len(q) for q in rows.values()])
 measured = pk.Measurements(
     np.concatenate(list(rows.values())),
-    sockets,
-    "touch",
+    None,
+    pk.readings.Touch(sockets, distances={("A", "B"): 50.0}),
     target=[0, 0, 100],  # the ball on the flange, more or less; it is found along
-    touch_distances={("A", "B"): 50.0},
 )
 measured
 

@@ -10,7 +10,7 @@ from pkmcal.effects.expansion import Expansion, MachineExpansion, expansion_of
 from pkmcal.estimation.parameters import Known
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.fitted.datum import DATUM
-from pkmcal.readings.calibratable import Calibratable
+from pkmcal.kinematics.calibratable import Calibratable
 
 Role = Literal["frame", "target", "attachment"]
 ROLES: tuple[Role, ...] = ("frame", "target", "attachment")

@@ -15,6 +15,7 @@ from pkmcal import arguments
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray, as_rows, propagate
 from pkmcal.calibration import summary
+from pkmcal.core import instruments
 from pkmcal.diagnostics.checks import AT_ONCE, CHECKS
 from pkmcal.diagnostics.diagnosis import Diagnosis
 from pkmcal.diagnostics.drift import Drift
@@ -27,9 +28,8 @@ from pkmcal.effects.expansion import in_words
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.fitted.row_names import row_names
 from pkmcal.fitted.solution import Solution
+from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.kinematics.robot import Robot
-from pkmcal.measurements.observation import predict
-from pkmcal.readings.calibratable import as_machine
 from pkmcal.result import Result
 
 if TYPE_CHECKING:
@@ -189,7 +189,7 @@ class Identification(Solution, Result):
         machine = as_machine(self.robot if session is None else self.robots[session])
         at, actuators, shape = machine.commanded(poses)
         by_numbers = machine.error_twists(at, actuators)[:, :, chosen.places]
-        by_geometry = predict("position", at, place).by_twist @ by_numbers
+        by_geometry = instruments.points(at, place)[1] @ by_numbers
         own = chosen.geometry_of(session)
         deviation = np.sqrt(propagate(by_geometry, self.fit.covariance[np.ix_(own, own)]))
         undetermined = self.fit.undetermined() * chosen.scale[:, None]

@@ -36,9 +36,9 @@ from pkmcal.estimation.loss import LIMITS, LossName
 from pkmcal.estimation.parameters import Asked, Bounds, Prior
 from pkmcal.exceptions import ArgumentError, CalibrationWarning
 from pkmcal.fitted.dropped import Drop, left_out
+from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.readings.calibratable import as_machine
 from pkmcal.statistics.covariance import RULES, CovarianceRule
 
 

@@ -44,9 +44,9 @@ from pkmcal.fitted.fit_statistics import (
 from pkmcal.fitted.holdout import HeldOut, draw, evaluate
 from pkmcal.fitted.row_names import row_names
 from pkmcal.fitted.slack import Cell, slack_cables, taut
+from pkmcal.kinematics.calibratable import Calibratable, as_given
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.readings.calibratable import Calibratable, as_given
 from pkmcal.statistics.covariance import CovarianceRule
 
 
@@ -255,7 +255,7 @@ def result(
 ) -> Identification:
     """Set all numbers, once; with `find_slack` also which cables the fit shows to be slack."""
     estimator, estimate, problem = fitted.estimator, fitted.estimate, fitted.problem
-    chosen, search = estimator.equations.parameters, estimator.search
+    chosen = estimator.equations.parameters
     exact, end = problem.exact, estimate.evaluation
     robots = _robots(exact, end)
     if exact is not estimator.equations:
@@ -269,9 +269,9 @@ def result(
         **vars(fits),
         **vars(repeats(sure)),
         **vars(held),
-        converged=search.converged,
-        evaluations=search.evaluations,
-        history=tuple(search.history),
+        converged=estimate.converged,
+        evaluations=estimate.evaluations,
+        history=estimate.history,
         robot=robots[chosen.sessions[-1] if chosen.sessions else ""],
         robots=_of_sessions(robots, held),
         prior_test=tested_prior(estimator, estimate),

@@ -45,9 +45,9 @@ from pkmcal.exceptions import ArgumentError
 from pkmcal.files.number_text import typed
 from pkmcal.files.reading import Input
 from pkmcal.fitted.dropped import Found
+from pkmcal.kinematics.calibratable import Calibratable, as_machine
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.tracker import Tracker
-from pkmcal.readings.calibratable import Calibratable, as_machine
 from pkmcal.report.as_json import as_json
 from pkmcal.statistics.covariance import RULES
 

@@ -24,7 +24,7 @@ from pkmcal.cli.measured import (
 from pkmcal.cli.options import Json, RobotOrArm
 from pkmcal.cli.output import say
 from pkmcal.display import first_rows
-from pkmcal.readings.calibratable import as_machine
+from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.report.as_json import as_json
 
 

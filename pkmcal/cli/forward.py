@@ -14,10 +14,10 @@ from pkmcal.cli.options import Force, Json, Radians, RobotOrArm
 from pkmcal.cli.output import Output, say
 from pkmcal.cli.rows import POSE_UNITS, numbers_on_line, table
 from pkmcal.core.library import POSE, STATUS
+from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.kinematics.reading_units import reading_units
 from pkmcal.measurements.command_csv import read_commands
 from pkmcal.measurements.pose_csv import write_poses
-from pkmcal.readings.calibratable import as_machine
 from pkmcal.report.as_json import as_json
 
 

@@ -10,7 +10,7 @@ from pkmcal.core.library import POSE
 from pkmcal.estimation.prior_functions import terms
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.units import UNITS
-from pkmcal.readings.calibratable import Calibratable
+from pkmcal.kinematics.calibratable import Calibratable
 
 _FRAME = dict(zip(POSE, ("mm", "mm", "mm", "rad", "rad", "rad"), strict=True))
 _PAIR = re.compile(r"(?P<name>[^=]+)=\s*(?P<value>[^=±]*?)\s*(?:±|\+-)\s*(?P<sigma>.*)")

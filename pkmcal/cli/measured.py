@@ -18,8 +18,8 @@ from pkmcal.files.number_text import typed
 from pkmcal.files.reading import MOST_ROBOT
 from pkmcal.files.toml_lines import Source
 from pkmcal.files.toml_table import Table
+from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.readings.calibratable import Calibratable
 
 _KEYS = ("header", "ignore", "rename", "units", "rotation")
 

@@ -21,17 +21,17 @@ from pkmcal.core.library import COORDINATE_UNITS
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.number_text import typed
 from pkmcal.geometry.box import Box
+from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.kinematics.reading_units import reading_units
 from pkmcal.kinematics.robot import Robot
 from pkmcal.kinematics.workspace import sample_poses
 from pkmcal.loading import load
 from pkmcal.measurements.command_csv import read_commands, write_commands
-from pkmcal.measurements.components import Kind
 from pkmcal.measurements.pose_csv import read_poses, write_poses
 from pkmcal.planning.optimal_design import CRITERIA
 from pkmcal.planning.plan_poses import PLANNED, Plan, plan_poses
 from pkmcal.planning.planned import UNKNOWN
-from pkmcal.readings.calibratable import as_machine
+from pkmcal.readings.registry import Kind
 from pkmcal.report.as_json import as_json
 
 _DRAWN, _SHARE = 500, 0.9  # candidates where none are given, and how far out they reach

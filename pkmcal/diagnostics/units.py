@@ -108,15 +108,15 @@ def other_readings(
     """Read measurements in other units, with other signs and with columns exchanged."""
     for unit in dict.fromkeys(actuator_units):
         mine = np.array([unit == other for other in actuator_units])
-        for name, factor in _FACTORS[unit]:
+        for name, factor in _FACTORS.get(unit, ()):
             q = np.where(mine, measured.actuators * factor, measured.actuators)
             yield f"the actuators are in {name}", replace(measured, actuators=q)
     yield "the actuators count the other way", replace(measured, actuators=-measured.actuators)
     yield from exchanges(measured)
     for unit in dict.fromkeys(measured.units):
         mine = np.array([unit == other for other in measured.units])
-        what = "angles" if unit == "rad" else "measured lengths"
-        for name, factor in _FACTORS[unit]:
+        what = {"mm": "measured lengths", "rad": "angles"}.get(unit, unit)
+        for name, factor in _FACTORS.get(unit, ()):
             values = measured.values * (factor if mine.all() else np.where(mine, factor, 1.0))
             yield f"the {what} are in {name}", replace(measured, values=values)
     names = measured.components
@@ -135,13 +135,13 @@ def _single_columns(
 ) -> Iterator[tuple[str, Measurements]]:
     """Read one column in another unit, or with the other sign."""
     for i, unit in enumerate(actuator_units):
-        for words, factor in (*_FACTORS[unit], (_REVERSED, -1.0)):
+        for words, factor in (*_FACTORS.get(unit, ()), (_REVERSED, -1.0)):
             q = measured.actuators.copy()
             q[:, i] *= factor
             yield _of_column(f"q{i + 1}", words), replace(measured, actuators=q)
     rows = measured.values.reshape(len(measured), -1)
     for k, (name, unit) in enumerate(zip(measured.components, measured.units, strict=True)):
-        for words, factor in (*_FACTORS[unit], (_REVERSED, -1.0)):
+        for words, factor in (*_FACTORS.get(unit, ()), (_REVERSED, -1.0)):
             values = rows.copy()
             values[:, k] *= factor
             values = values.reshape(measured.values.shape)

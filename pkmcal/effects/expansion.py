@@ -19,9 +19,9 @@ from pkmcal.arguments import did_you_mean, shown
 from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.effects.effect import Moved
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
+from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.readings.calibratable import Calibratable
 from pkmcal.readings.unknowns import Dependence
 
 Coefficients = float | Mapping[str, float] | None

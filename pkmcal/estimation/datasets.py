@@ -18,9 +18,8 @@ from pkmcal.estimation.sessions import in_sessions, set_names
 from pkmcal.estimation.starts import with_starts
 from pkmcal.estimation.tensioned_poses import unknown_tensions
 from pkmcal.exceptions import ArgumentError
-from pkmcal.measurements.components import KINDS
+from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.readings.calibratable import Calibratable
 
 Said = Mapping[str, Known | Sequence[Known]]  # of "frame", "target" and "attachment"
 
@@ -78,7 +77,7 @@ def as_fit_data(
         raise ArgumentError("measurements: state actuator_sigma of all sets, or of none")
     if any(data.unknown_frame for data in datasets) and not any(data.framed for data in datasets):
         raise ArgumentError("frame: distances do not depend on it, it cannot be unknown")
-    distances = any(KINDS[data.measured.kind].point == "base" for data in datasets)
+    distances = any(data.measured.instrument.point == "base" for data in datasets)
     if any(data.unknown_attachment for data in datasets) and not distances:
         raise ArgumentError("attachment: distances alone have one, it cannot be unknown")
     return with_starts(robot, datasets)

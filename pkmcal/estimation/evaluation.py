@@ -10,7 +10,7 @@ from pkmcal.estimation.elimination import System
 from pkmcal.estimation.parameters import Parameters
 from pkmcal.estimation.row_states import RowStates
 from pkmcal.estimation.session_machines import Machines
-from pkmcal.readings.calibratable import Calibratable
+from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.readings.reading import Predicted
 
 

@@ -10,7 +10,6 @@ import numpy as np
 
 from pkmcal.arrays import BoolArray, IntArray
 from pkmcal.effects.expansion import MachineExpansion
-from pkmcal.measurements.components import KINDS
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.readings.unknowns import PLACE, Dependence, Numbers, Start, points_of
 
@@ -54,7 +53,7 @@ class FitData:
     @property
     def framed(self) -> bool:
         """Whether these readings depend on the unknown frame."""
-        return self.unknown_frame and KINDS[self.measured.kind].framed
+        return self.unknown_frame and self.measured.instrument.framed
 
     @property
     def along(self) -> IntArray | None:

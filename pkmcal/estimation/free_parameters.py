@@ -19,9 +19,9 @@ from pkmcal.estimation.prior_functions import is_function, prior_functions
 from pkmcal.estimation.sessions import Scope, label, matches, scopes
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.geometry.load import is_of_load
+from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.readings.calibratable import Calibratable
 
 _LEAST_PRIOR, _MOST_PRIOR = 1e-15, 1e15  # mm or rad, whose squares are numbers
 
@@ -65,8 +65,8 @@ def parameters(
     pull = max(_pull(robot, data.measured) for data in datasets)
     of_unit |= {"1/N": 1.0 / travel / pull, "N": pull / robot.length}
     scale = np.array([
-        of_unit[unit] if row.scale[j] is None else row.scale[j]
-        for j, unit in zip(number_of.tolist(), units, strict=True)
+        _scale(of_unit, names[i], unit) if row.scale[j] is None else row.scale[j]
+        for i, (j, unit) in enumerate(zip(number_of.tolist(), units, strict=True))
     ])  # fmt: skip
     if like is not None:
         known = dict(zip(like.names, like.scale.tolist(), strict=True))
@@ -100,6 +100,15 @@ def parameters(
     columns = {session: made.geometry_of(session) for session in made.sessions or ("",)}
     given = (asked.prior, robot, start, row.places, columns)
     return replace(made, functions=prior_functions(*given, strict=like is None))
+
+
+def _scale(of_unit: Mapping[str, float], name: str, unit: str) -> float:
+    if unit not in of_unit:
+        raise ArgumentError(
+            f"{name}: its reading has to state by which change, in {unit}, it moves readings as"
+            " much as 1 mm of the machine does (the scale of its numbers)"
+        )
+    return of_unit[unit]
 
 
 @dataclass(frozen=True, eq=False)

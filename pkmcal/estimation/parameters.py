@@ -19,7 +19,7 @@ from pkmcal.estimation.fit_data import Dependence, FitData
 from pkmcal.estimation.prior_functions import PriorFunction
 from pkmcal.estimation.sessions import NONE, ParameterMap, Scope, label
 from pkmcal.estimation.smoothness import smoothness_rows
-from pkmcal.readings.calibratable import Calibratable
+from pkmcal.kinematics.calibratable import Calibratable
 
 Prior = float | Mapping[str, float | tuple[float, float]] | None
 Known = Literal["known", "unknown"]

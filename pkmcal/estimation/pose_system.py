@@ -14,7 +14,6 @@ from pkmcal.estimation.row_blocks import PoseBlocks
 from pkmcal.estimation.row_states import RowStates
 from pkmcal.estimation.session_machines import Machines, SessionClosures
 from pkmcal.estimation.whitening import Whitening
-from pkmcal.measurements.observation import by_difference
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +55,7 @@ class PoseSystem:
         predicted = self.prediction.at(states.pose, theta)
         residuals = self.prediction.residuals(predicted)
         by_pose = [
-            by_difference(m.kind, each.by_twist @ twists[place], residual)
+            m.instrument.by_difference(each.by_twist @ twists[place], residual)
             for m, each, place, residual in zip(
                 table.sets, predicted, table.pose_of, residuals, strict=True
             )
@@ -78,8 +77,8 @@ class PoseSystem:
         cache["system"] = self, noise, found
         return found
 
-    def by_parameters(self, evaluation: Evaluation, noise: FloatArray) -> tuple[int, FloatArray]:
-        """How many blocks there are, and the derivative (M, n) of their reduced equations."""
+    def by_parameters(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
+        """Derivative (M, n) of what is predicted by the parameters, whitened and reduced."""
         p, blocks = self.prediction.parameters, self.blocks
         columns = self.prediction.table.machine_columns
         of_closures = self.closures.by_numbers(
@@ -92,7 +91,7 @@ class PoseSystem:
             by_all = np.concatenate([by_all, self.whitening.whiten(of_readings, noise)])
         by_unknown = self.at(evaluation, noise).by_unknown
         found, evaluation.cache["following"] = blocks.elimination.reduced(by_unknown, by_all)
-        return len(blocks.components), found
+        return found
 
     def by_groups(
         self,

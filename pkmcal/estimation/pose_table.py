@@ -12,10 +12,10 @@ from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.sessions import ParameterMap
 from pkmcal.estimation.tensioned_poses import Cells, cells_of, check_cells
+from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.kinematics.drive_state import DriveState
-from pkmcal.measurements.fields import filled_tension
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.readings.calibratable import Calibratable
+from pkmcal.measurements.tension import filled_tension
 
 
 @dataclass(frozen=True, eq=False)

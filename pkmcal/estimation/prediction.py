@@ -14,11 +14,13 @@ from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.parameters import Parameters
 from pkmcal.estimation.pose_table import PoseTable, pose_table
+from pkmcal.estimation.row_states import RowStates
 from pkmcal.estimation.session_machines import SessionClosures
 from pkmcal.estimation.sessions import NONE, ParameterMap
-from pkmcal.measurements.observation import by_difference, corrected, difference, joined
-from pkmcal.readings.calibratable import Calibratable
-from pkmcal.readings.reading import At, Predicted
+from pkmcal.exceptions import ArgumentError
+from pkmcal.kinematics.calibratable import Calibratable
+from pkmcal.readings import joint_angles, orientation
+from pkmcal.readings.reading import At, Predicted, joined
 
 _BATCH = 1024  # rows whose derivatives by the parameters are made at once, as many as caches hold
 
@@ -141,6 +143,39 @@ class Prediction:
                     found.setdefault(tool, {})[i] = np.flatnonzero(first == tool)
         return found
 
+    @cached_property
+    def guess(self) -> RowStates:
+        """Where a search for the poses begins: at home, or where they were read."""
+        table = self.table
+        guess = np.tile(self.parameters.robot.home, (len(table.actuators), 1))
+        every = zip(table.sets, table.pose_of, self.arguments, strict=True)
+        for measured, place, arguments in every:
+            elsewhere = arguments.framed or "tool" in arguments.columns
+            if measured.kind in ("pose", "position") and not elsewhere:
+                known = np.isfinite(measured.values)
+                ever = np.flatnonzero(known.any(axis=0))  # not across a plane, say
+                read = np.flatnonzero(known[:, ever].all(axis=1))
+                values = measured.values[np.ix_(read, ever)]
+                if 5 in ever:  # angles are read together
+                    values[:, -3:] = orientation.shortest(values[:, -3:])
+                guess[np.ix_(place[read], ever)] = values
+        return RowStates(guess, table.actuators, np.zeros(len(guess), dtype=np.int32))
+
+    def refuse_free_poses(self) -> None:
+        """Refuse effects, and readings of joints and between poses, where poses have unknowns."""
+        if any(arguments.effects for arguments in self.arguments):
+            raise ArgumentError(
+                "expansion: needs poses that follow from the actuators: no actuator_sigma, and"
+                " no surplus actuators; found others"
+            )
+        for m in self.table.sets:
+            follows = m.joint and joint_angles.follows_pose(self.parameters.robot, m.joint)
+            if m.kind in ("between", "angle") and not follows:
+                raise ArgumentError(
+                    f"measurements: readings of kind {m.kind!r} need poses that follow from the"
+                    " actuators: no actuator_sigma, and no surplus actuators"
+                )
+
     def arguments_of(self, i: int, theta: FloatArray) -> dict[str, FloatArray]:
         """What readings of set `i` depend on beside the pose, (N, w) each, for `predict`."""
         own = self.arguments[i]
@@ -164,7 +199,7 @@ class Prediction:
     def residuals(self, predicted: Sequence[Predicted]) -> tuple[FloatArray, ...]:
         """Measured less predicted of each set."""
         return tuple(
-            difference(measured.kind, measured.values, each.values)
+            measured.instrument.difference(measured.values, each.values)
             for measured, each in zip(self.table.sets, predicted, strict=True)
         )
 
@@ -215,7 +250,7 @@ class Prediction:
             if grown is not None and target is not None and "target" in predicted.by:
                 shift = target * grown[:, None]
                 change += np.einsum("nki,ni->nk", predicted.by["target"], shift)
-        values = corrected(table.sets[i].kind, predicted.values, change)
+        values = table.sets[i].instrument.corrected(predicted.values, change)
         return replace(predicted, values=values, by=by)
 
     def _place(self, i: int, pose: FloatArray, theta: FloatArray) -> At:
@@ -225,7 +260,6 @@ class Prediction:
             pose[self.table.pose_of[i]],
             None if other is None else pose[other],
             along=self.arguments[i].along,
-            artefact=measured.artefact,
             machines=lambda: self._machines(i, theta),
             measured=measured,
         )
@@ -282,8 +316,8 @@ class Prediction:
             for (i, rows), part in zip(some, parts, strict=True):
                 self._add_direct(part, i, rows, predicted[i], direct[i])
                 wide = self.columns.of_rows(part, i, rows)
-                kind, residual = table.sets[i].kind, evaluation.residuals[i][rows]
-                found.append((i, rows, by_difference(kind, wide, residual)))
+                read, residual = table.sets[i].instrument, evaluation.residuals[i][rows]
+                found.append((i, rows, read.by_difference(wide, residual)))
             yield batch, found
 
     def jacobian(self, evaluation: Evaluation, closures: SessionClosures) -> list[FloatArray]:

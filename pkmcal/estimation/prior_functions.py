@@ -16,8 +16,8 @@ from pkmcal.arguments import did_you_mean, number
 from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.geometry import Geometry
+from pkmcal.kinematics.calibratable import Calibratable, NamedNumbers
 from pkmcal.kinematics.robot import Robot
-from pkmcal.readings.calibratable import Calibratable, NamedNumbers
 
 _OPERATOR = re.compile(r"\s+([+-])\s+")
 _BEHIND = "@.0123456789"  # a point's name without it says which body it is of

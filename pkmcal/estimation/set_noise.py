@@ -9,7 +9,6 @@ from __future__ import annotations
 import numpy as np
 
 from pkmcal.arrays import FloatArray
-from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.estimate import Estimate
 from pkmcal.estimation.estimator import FEW, Estimator
 from pkmcal.statistics.distributions import chi2_tail
@@ -34,7 +33,7 @@ def slipped(estimator: Estimator, estimate: Estimate) -> FloatArray:
     common = 1.0 if unstated.any() else float(squares.sum() / max(freedom.sum(), 1e-9))
     if not common > 0.0:
         return ratios  # no residual at all
-    rows, set_of = equations.squares(estimate.residual), equations.set_of
+    rows, set_of = equations.blocks.squares(estimate.residual), equations.set_of
     for i in np.flatnonzero(~unstated & (freedom >= FEW)):
         above = chi2_tail(float(squares[i]) / common, float(freedom[i]))
         components = equations.components[set_of == i]

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.kinematics.robot import Robot
-from pkmcal.readings.calibratable import Calibratable
 
 
 def smoothness_rows(

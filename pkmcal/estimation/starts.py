@@ -14,17 +14,18 @@ import numpy as np
 
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.exceptions import ArgumentError
-from pkmcal.measurements.components import KINDS
+from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.readings.calibratable import Calibratable
+from pkmcal.readings.registry import KINDS
+from pkmcal.readings.touches import TouchDistance
 from pkmcal.readings.unknowns import Found
 
 
 def with_starts(machine: Calibratable, datasets: Sequence[FitData]) -> list[FitData]:
     """The same sets, with where all is that they always find along."""
     found: Found = {}
-    for reading in KINDS.values():
-        mine = [data for data in datasets if data.measured.kind == reading.name]
+    for kind in dict.fromkeys([*KINDS, *(data.measured.kind for data in datasets)]):
+        mine = [data for data in datasets if data.measured.kind == kind]
         if mine:
             first = mine[0].measured.instrument
             nowhere = [(data, np.empty(0)) for data in mine]
@@ -62,9 +63,8 @@ def known_distances(datasets: Sequence[FitData]) -> list[FitData]:
     readings = Measurements(
         np.array(actuators),
         [mm for _, _, mm, _ in stated],
-        "touch-distance",
+        TouchDistance(tuple(stated)),
         sigma=[sigma for *_, sigma in stated],
-        touch_distances=tuple(stated),
         actuator_sigma=np.array(sigmas, dtype=np.float64) if noisy else None,
     )
     rows = np.arange(first, first + len(stated))

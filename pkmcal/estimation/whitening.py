@@ -9,7 +9,6 @@ from functools import cached_property
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, lots
-from pkmcal.measurements.components import KINDS
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.readings import orientation
 
@@ -139,7 +138,7 @@ def _whitening(measured: Measurements, length: float) -> FloatArray:
     sigma = measured.sigma
     if sigma is None:
         return np.tile(measured.instrument.mm(measured, length), (len(measured), 1))
-    first = KINDS[measured.kind].turning
+    first = measured.instrument.turning
     if first is not None and not _same_turnings(sigma, first):
         sigma = orientation.covariance(sigma, np.nan_to_num(measured.values[:, first:]))
     if sigma.ndim == 2:

@@ -8,7 +8,7 @@ own here, and is read where the order of the angles is stated.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from pkmcal.core.library import POSE
 
@@ -31,7 +31,8 @@ VECTOR = ("rvx", "rvy", "rvz")
 QUATERNION = ("qw", "qx", "qy", "qz")
 NUMBERED = ("quat1", "quat2", "quat3", "quat4")  # which of them is the scalar is not known
 MATRIX = tuple(f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))
-ORIENTATIONS = (*EULER, VECTOR, QUATERNION, NUMBERED, MATRIX)
+ANGLES = ("alpha", "beta", "gamma")
+ORIENTATIONS = (ANGLES, *EULER, VECTOR, QUATERNION, NUMBERED, MATRIX)
 
 # Each name here, and what else it is called.
 _SYNONYMS: dict[str, str] = {
@@ -146,6 +147,16 @@ def known_as(name: str) -> str:
     ('q1', 'x', 'SMR 2.z', 'Furlongs')
     """
     return canonical([name])[name]
+
+
+def orientation_in(names: Collection[str]) -> tuple[str, ...]:
+    """The columns that state an orientation; none where there are none, or not all of them."""
+    return next((form for form in ORIENTATIONS if all(name in names for name in form)), ())
+
+
+def is_turned(names: Collection[str]) -> bool:
+    """Whether columns state an orientation, or a part of one."""
+    return bool(orientation_in(names)) or any(angle in names for angle in ANGLES)
 
 
 def canonical(

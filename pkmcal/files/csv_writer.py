@@ -4,11 +4,55 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable
+import math
+from collections.abc import Iterable, Sequence
 from os import PathLike
+from typing import NamedTuple
+
+import numpy as np
 
 from pkmcal import arguments
+from pkmcal.arrays import FloatArray, IntArray, TextArray
 from pkmcal.files.atomic import write_whole
+
+
+class WrittenColumn(NamedTuple):
+    """A column that is to be written or printed.
+
+    Attributes
+    ----------
+    name : str
+        Its name, without unit.
+    unit : str
+        "mm", "rad" or another; "" where it has none.
+    values : ndarray (N,)
+        Numbers, NaN where there is none, or texts.
+    """
+
+    name: str
+    unit: str
+    values: FloatArray | IntArray | TextArray
+
+    @property
+    def heading(self) -> str:
+        """Name and unit."""
+        return f"{self.name} [{self.unit}]" if self.unit else self.name
+
+    def cells(self) -> list[str]:
+        """The shortest decimals that are read back to the same bits; nothing for NaN."""
+        values = np.asarray(self.values)
+        if values.dtype.kind != "f":
+            return [str(value) for value in values.tolist()]
+        return ["" if math.isnan(value) else repr(value) for value in values.tolist()]
+
+
+def numbered(
+    name: str, unit: str | Sequence[str], values: FloatArray | IntArray
+) -> Iterable[WrittenColumn]:
+    """Columns ``name.q1`` … of numbers (N, n) of the actuators, each with its unit."""
+    units = [unit] * values.shape[1] if isinstance(unit, str) else unit
+    for i, (one, column) in enumerate(zip(units, values.T, strict=True)):
+        yield WrittenColumn(f"{name}.q{i + 1}", one, column)
 
 
 def write_csv(

@@ -21,8 +21,8 @@ from pkmcal.estimation.labels import Labels, labels
 from pkmcal.estimation.uncertainty import Uncertainty, stated_variances
 from pkmcal.fitted.distances import Distances, distances
 from pkmcal.fitted.later import Later, OwnNumbers, compared, later
+from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.readings.calibratable import Calibratable
 from pkmcal.statistics.distributions import f_tail
 from pkmcal.statistics.holdout_test import RATIO, HoldoutTest, Lengths, holdout_test
 from pkmcal.statistics.linear_fit import numbered
@@ -152,7 +152,7 @@ def evaluate(
     rows = later(estimator.equations.parameters, held)
     whole = rows.equations(estimator.equations)
     before = whole.with_exact_actuators().start(rows.at(estimator.start.theta), rows.own)
-    equations, after, own = compared(rows, whole, estimate, uncertainty)
+    equations, after, own = compared(rows, whole, estimate, uncertainty, before.begun)
     rows = replace(rows, parameters=equations.parameters)  # their own frames have been laid
     named = labels(equations)
     points = _points(rows, equations, after, named, own, uncertainty)

@@ -21,8 +21,8 @@ from pkmcal.estimation.estimator import Estimator
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.limb_kinds import KINDS
+from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.kinematics.robot import Robot
-from pkmcal.readings.calibratable import Calibratable
 from pkmcal.statistics.robust_scale import median_ratio
 
 _LISTED = 3  # cables that a warning names
@@ -134,7 +134,8 @@ def _without_each(
 def _squares(equations: Equations, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
     """Squared residuals of each pose (K,)."""
     found = np.zeros(len(equations.actuators))
-    found[equations.blocks.pose_of_block] = equations.squares(equations.residual(evaluation, noise))
+    blocks = equations.blocks
+    found[blocks.pose_of_block] = blocks.squares(equations.residual(evaluation, noise))
     return found
 
 

@@ -14,8 +14,8 @@ from pkmcal.exceptions import FileError
 from pkmcal.files.column_names import BESIDE
 from pkmcal.files.csv_table import Table
 from pkmcal.measurements.actuator_columns import actuators_in
-from pkmcal.measurements.point_names import split
-from pkmcal.measurements.temperature_columns import WHOLE
+from pkmcal.measurements.field import Field
+from pkmcal.measurements.table_layout import split
 from pkmcal.measurements.time_stamps import seconds, with_date
 
 Join = Literal["auto", "name", "row", "time"]
@@ -24,13 +24,6 @@ _LATE = re.compile(r"row([+-][1-9][0-9]{0,5})")
 _ENOUGH = 0.5  # of the points have to be found by a key for it to be one
 _NUMBER = re.compile(r"([0-9]+)\D*$")
 _LISTED = 3
-_BESIDE = (
-    "session",
-    "approach",
-    "tension",
-    "tension_sigma",
-    "temperature",
-)  # of the log, beside its actuators
 _EPOCH = 1e8  # s: seconds since 1970 are more
 
 Rows = list[int | None]  # of the log, for each row of the instrument
@@ -53,13 +46,13 @@ def way_and_shift(given: object) -> tuple[Join, int]:
     return ("row", int(late[1])) if late else (word("join", given, JOINS), 0)
 
 
-def join(table: Table, log: Table, how: Join, shift: int = 0) -> None:
+def join(table: Table, log: Table, how: Join, shift: int = 0, fields: Sequence[Field] = ()) -> None:
     """Give the rows of an instrument the actuators of a controller's log; what was done is a note.
 
     By name: the point's name, its pose or its group is that of a row of the log. By time: each
     point takes the last row of the log at or before it. By row: as many rows, in the same order,
     or a row of the log for each pose; with a shift, the row that many after it. Points without a
-    row are left out.
+    row are left out. Beside actuators the log gives those of the `fields` that are logged.
 
     Raises
     ------
@@ -84,7 +77,8 @@ def join(table: Table, log: Table, how: Join, shift: int = 0) -> None:
         if shift:
             rows = [_within(row, shift, len(log)) for row in rows]
             said += f", each with the row {abs(shift)} {'after' if shift > 0 else 'before'} it"
-        _put(table, log, actuators, rows, f"joined with {log.path} by {way}: {said}")
+        said = f"joined with {log.path} by {way}: {said}"
+        _put(table, log, actuators, rows, said, [each for each in fields if each.logged])
         return
     raise FileError(f"{table.path}: cannot be joined with {log.path}; {'; '.join(refused)}")
 
@@ -93,7 +87,14 @@ def _within(row: int | None, shift: int, count: int) -> int | None:
     return row + shift if row is not None and 0 <= row + shift < count else None
 
 
-def _put(table: Table, log: Table, actuators: Sequence[str], rows: Rows, said: str) -> None:
+def _put(
+    table: Table,
+    log: Table,
+    actuators: Sequence[str],
+    rows: Rows,
+    said: str,
+    logged: Sequence[Field],
+) -> None:
     kept = [i for i, row in enumerate(rows) if row is not None]
     unmatched = [i for i, row in enumerate(rows) if row is None]
     unused = len(log) - len({row for row in rows if row is not None})
@@ -107,32 +108,32 @@ def _put(table: Table, log: Table, actuators: Sequence[str], rows: Rows, said: s
         said += f"; {unused} of its {len(log)} rows not used"
     table.take(kept)
     chosen = [row for row in rows if row is not None]
-    own = [name for name in table.columns if name.partition(".")[0] == WHOLE]
-    if own and any(name.partition(".")[0] == WHOLE for name in log.columns):
-        table.notes.append(
-            f"column {table.columns[own[0]].name!r} left out: the temperature in {log.path} is"
-            " taken for the machine's"
-        )
-        table.leave_out(own)
-    beside = [
-        name
-        for name in log.columns
-        if name.partition(".")[0] in _BESIDE and name not in table.columns
-    ]
+    for field in logged:
+        own = [name for name in table.columns if _is_of(name, field)]
+        if field.log_first and own and any(_is_of(name, field) for name in log.columns):
+            table.notes.append(
+                f"column {table.columns[own[0]].name!r} left out: the {field.name} in {log.path} is"
+                " taken for the machine's"
+            )
+            table.leave_out(own)
+    of_fields = [name for name in log.columns if any(_is_of(name, field) for field in logged)]
+    beside = [name for name in of_fields if name not in table.columns]
     for name in [*actuators, *beside]:
         table.put(name, log.columns[name].take(chosen))
-    table.elsewhere += [f"{log.path}: {note}" for note in [*log.notes, *_not_used(log, actuators)]]
+    table.elsewhere += [
+        f"{log.path}: {note}" for note in [*log.notes, *_not_used(log, [*actuators, *of_fields])]
+    ]
     table.notes.append(said)
 
 
-def _not_used(log: Table, actuators: Sequence[str]) -> list[str]:
+def _is_of(name: str, field: Field) -> bool:
+    return name.partition(".")[0] == field.name
+
+
+def _not_used(log: Table, used: Sequence[str]) -> list[str]:
     """A line that names the columns of a log of which nothing is taken."""
-    looked_at = {*actuators, *BESIDE, "group", "target", *_BESIDE}
-    rest = [
-        repr(column.name)
-        for name, column in log.columns.items()
-        if name not in looked_at and name.partition(".")[0] not in _BESIDE
-    ]
+    looked_at = {*used, *BESIDE, "group", "target"}
+    rest = [repr(column.name) for name, column in log.columns.items() if name not in looked_at]
     more = f" and {len(rest) - _LISTED} more" if len(rest) > _LISTED else ""
     return [f"not used: {', '.join(rest[:_LISTED])}{more}"] if rest else []
 

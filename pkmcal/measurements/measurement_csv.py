@@ -31,6 +31,18 @@ columns                               meaning
 ``attachment.x [mm]`` ``.y`` ``.z``   where on the platform a distance ends; its origin by default
 ====================================  =============================================================
 
+============================  =====================================================================
+columns of single kinds       meaning
+============================  =====================================================================
+``to.q1 [mm]`` …              of a ``distance``: between where ``q1`` … and where these lead
+``run``                       of a ``distance``: it counts from a zero of this run
+``tilt1 [deg], tilt2``        how far x and y of a sensor point up
+``angle:limb1.joint2 [deg]``  the angle of a passive joint
+``touch``                     the name of the point that is touched; ``touch:line``, ``touch:plane``
+                              and ``touch:sphere`` where it is another artefact
+``touch.to`` …                known distances: `pkmcal.readings.known_distances`
+============================  =====================================================================
+
 An empty cell of what was measured says that it was not read there; without any measured column the
 actuators are all that is known.
 
@@ -44,7 +56,6 @@ covariances in products of mm and rad; actuators also in steps where the robot h
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from os import PathLike
@@ -54,30 +65,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal import arguments
-from pkmcal.arrays import FloatArray, TextArray, as_rows
+from pkmcal.arrays import FloatArray, as_rows
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError, FileError
-from pkmcal.files.column_names import SYNONYMS
+from pkmcal.files.column_names import ANGLES, SYNONYMS, orientation_in
 from pkmcal.files.csv_table import Table
+from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.kinematics.reading_units import Actuated
 from pkmcal.kinematics.robot import Robot
-from pkmcal.measurements.actuator_columns import (
-    actuators_in,
-    compare,
-    read_actuators,
-    read_of_actuators,
-)
-from pkmcal.measurements.components import KINDS, Kind
+from pkmcal.measurements.actuator_columns import actuators_in, compare, read_actuators
+from pkmcal.measurements.field import row_fields
 from pkmcal.measurements.join import join as joined
 from pkmcal.measurements.join import way_and_shift
-from pkmcal.measurements.kind_columns import (
-    component_names,
-    kinds_in,
-    names_of_kinds,
-    read_kind_fields,
-    value_columns,
-)
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.measurements.orientation_columns import ANGLES, checked, names_in
 from pkmcal.measurements.plane_columns import fill_in
 from pkmcal.measurements.probe import (
     agreement,
@@ -86,21 +85,23 @@ from pkmcal.measurements.probe import (
     is_of_trigger,
     probed,
 )
-from pkmcal.measurements.sigma_columns import read_actuator_sigma, read_sigma
 from pkmcal.measurements.table_layout import (
     Layout,
+    checked_rotation,
     layout,
     leave_out_unknown,
     number_groups,
     open_table,
     split_names,
 )
-from pkmcal.measurements.target_columns import read_several, read_targets, several_targets
-from pkmcal.measurements.temperature_columns import WHOLE, parts_of, read_temperature
-from pkmcal.measurements.time_stamps import times_of
-from pkmcal.readings.calibratable import as_machine
+from pkmcal.measurements.targets import read_several, read_targets, several_targets
+from pkmcal.readings.closure import Closure
+from pkmcal.readings.points import Position
+from pkmcal.readings.reading import Reading
+from pkmcal.readings.registry import KINDS
 
 _AXES = ("x", "y", "z")
+_FIELDS = row_fields(Measurements)
 _TRIED = 200  # rows by which an order of angles is told
 
 
@@ -116,6 +117,7 @@ def read_measurements(
     units: str | Sequence[str] = (),
     rotation: str | None = None,
     probe_offset: ArrayLike = (0.0, 0.0, 0.0),
+    kind: Reading | None = None,
 ) -> Measurements:
     r"""Read measurements from a CSV file; its module lists the columns.
 
@@ -150,6 +152,8 @@ def read_measurements(
         each about the turned axis; "xyz", about fixed axes; "rotvec"; "wxyz" or "xyzw".
     probe_offset : (3,) array
         Of a column ``probe``: the firmware's offsets of the probe, mm, as in `probed`.
+    kind : Reading, optional
+        A reading of your own that the file may hold.
 
     Returns
     -------
@@ -183,45 +187,37 @@ def read_measurements(
     table = _table(path, controller, join, how, joints)
     split_names(table)
     number_groups(table)
-    several = several_targets(table)
-    times = times_of(table)
-    leave_out_unknown(table, _known(table, several), SYNONYMS)
+    readings = [*KINDS.values(), *(() if kind is None else (kind,))]
+    points = {name for each in readings for name in each.own_points}
+    several = several_targets(table, points)
+    leave_out_unknown(table, _known(table, several, readings, points), SYNONYMS)
     if not table.columns.keys().isdisjoint(("probe", "contact")):
-        return _read_probe(table, robot, probe_offset, times)
-    actuators, actuator_units = read_actuators(table, robot)
-    compare(table, actuator_units, robot)
+        return _read_probe(table, robot, probe_offset)
+    actuators, units = read_actuators(table, robot)
+    compare(table, units, robot)
     fill_in(table, robot, several)
-    kind = _kind(table, several)
-    fields: dict[str, Any] = {"sigma": read_sigma(table, kind), "lines": np.array(table.lines)}
-    fields["actuator_sigma"] = read_actuator_sigma(table, actuator_units)
-    fields |= read_kind_fields(table, kind, actuator_units)
-    if "group" in table.columns:
-        fields["group"] = table.integers("group")
-    fields["session"] = _read_session(table)
-    fields["time"] = times
-    fields["temperature"] = read_temperature(table, len(actuator_units))
-    fields["approach"] = _read_approach(table, len(actuator_units))
-    fields["tension"] = _read_tension(table, len(actuator_units))
-    fields["tension_sigma"] = _read_tension_sigma(table, len(actuator_units))
+    read = _reading(table, several, readings).read(table, units)
+    fields = _read_fields(table, read, units)
     values: FloatArray | None
     if several:
-        actuators, values, fields = read_several(table, several, actuators, fields)
+        actuators, values, fields = read_several(table, several, actuators, fields, points)
     else:
-        values = _read_values(table, kind, checked(rotation), actuators, robot)
-        fields |= read_targets(table, kind)
+        values = _read_values(table, read, checked_rotation(rotation), actuators, robot)
+        read, targets = read_targets(table, read, readings)
+        fields |= targets
     try:
         measured = Measurements(
             actuators,
             values,
-            kind,
-            actuator_units=actuator_units,
+            read,
+            actuator_units=units,
             notes=_notes(table),
             file=table.path.name,
             **fields,
         )
     except ValueError as error:
         raise FileError(f"{table.path}: {error}") from None
-    if kind == "height" and isinstance(robot, Robot):
+    if read.by_firmware and isinstance(robot, Robot):
         if said := agreement(robot, measured, str(table.path)):
             table.notes.append(said)
         if is_of_a_flat(robot, measured):
@@ -237,9 +233,13 @@ def _notes(table: Table) -> tuple[str, ...]:
     return (*table.elsewhere, *(f"{table.path}: {note}" for note in table.notes))
 
 
-def _read_probe(
-    table: Table, robot: Actuated | None, offset: ArrayLike, times: FloatArray | None
-) -> Measurements:
+def _read_fields(table: Table, read: Reading, units: Sequence[str]) -> dict[str, Any]:
+    """Fields of the rows that a table states."""
+    found = {each.name: each.read(table, read, units) for each in _FIELDS}
+    return found | {"lines": np.array(table.lines)}
+
+
+def _read_probe(table: Table, robot: Actuated | None, offset: ArrayLike) -> Measurements:
     """Heights of a probe's tip where it triggered: 0, on the bed."""
     what = "probe" if "probe" in table.columns else "contact"
     if not isinstance(robot, Robot):
@@ -248,7 +248,7 @@ def _read_probe(
             " it probed"
         )
     if what == "contact":
-        return _read_contacts(table, robot, offset, times)
+        return _read_contacts(table, robot, offset)
     z = table.numbers("probe", "mm")[0]
     if actuators_in(table):
         actuators, units = read_actuators(table, robot)
@@ -269,13 +269,11 @@ def _read_probe(
         f"{table.columns['probe'].name!r} taken as the firmware's z when the probe triggered: the"
         " actuators are those that the robot file has there, and the probe's tip is at 0"
     )
-    return _probed(table, robot, poses, offset, times)
+    return _probed(table, robot, poses, offset)
 
 
-def _read_contacts(
-    table: Table, robot: Robot, offset: ArrayLike, times: FloatArray | None
-) -> Measurements:
-    """The same where the firmware says where the nozzle would touch: its offsets are taken off."""
+def _read_contacts(table: Table, robot: Robot, offset: ArrayLike) -> Measurements:
+    """Heights of a tip, where the firmware says where the nozzle would touch the bed."""
     places = table.stacked(["x", "y", "contact"], ["mm", "mm", "mm"])
     given, shape = as_rows("probe_offset", offset, 3)
     if shape != () or not np.isfinite(given).all():
@@ -286,28 +284,19 @@ def _read_contacts(
         f" they are taken as {shown} mm (--probe-offset, x_offset, y_offset and z_offset of its"
         " configuration)"
     )
-    return _probed(table, robot, places - given[0] * [1.0, 1.0, -1.0], offset, times)
+    return _probed(table, robot, places - given[0] * [1.0, 1.0, -1.0], offset)
 
 
-def _probed(
-    table: Table, robot: Robot, points: FloatArray, offset: ArrayLike, times: FloatArray | None
-) -> Measurements:
+def _probed(table: Table, robot: Robot, points: FloatArray, offset: ArrayLike) -> Measurements:
     try:
-        measured = probed(robot, points, offset=offset, sigma=read_sigma(table, "height"))
+        measured = probed(robot, points, offset=offset)
+        fields = _read_fields(table, measured.instrument, robot.actuator_units)
+        given = {name: value for name, value in fields.items() if value is not None}
+        return replace(measured, notes=_notes(table), file=table.path.name, **given)
+    except FileError:
+        raise
     except ValueError as error:
         raise FileError(f"{table.path}: {error}") from None
-    return replace(
-        measured,
-        notes=_notes(table),
-        lines=np.array(table.lines),
-        file=table.path.name,
-        session=_read_session(table),
-        time=times,
-        temperature=read_temperature(table, measured.actuators.shape[1]),
-        approach=_read_approach(table, measured.actuators.shape[1]),
-        tension=_read_tension(table, measured.actuators.shape[1]),
-        tension_sigma=_read_tension_sigma(table, measured.actuators.shape[1]),
-    )
 
 
 def _table(
@@ -331,7 +320,7 @@ def _table(
     for name in seen:
         if not any(_has(each, name) for each in (table, log)) and name not in columns.ignore:
             raise table.header_error(f"no column {name!r} to rename, nor in {log.path}")
-    joined(table, log, way, shift)
+    joined(table, log, way, shift, _FIELDS)
     return table
 
 
@@ -339,71 +328,46 @@ def _has(table: Table, name: str) -> bool:
     return any(column.name == name for column in table.columns.values())
 
 
-def _known(table: Table, several: tuple[str, ...]) -> set[str]:
+def _known(
+    table: Table, several: tuple[str, ...], readings: Sequence[Reading], points: set[str]
+) -> set[str]:
     """Names of columns that are read."""
-    components = _AXES + ANGLES
     actuators = {f"q{i + 1}" for i in range(len(table.columns))} | {*actuators_in(table)}
-    names = actuators | {
-        *components,
-        "distance",
-        "sigma",
-        "group",
-        "session",
-        "target",
-        "probe",
-        "contact",
-    }
-    names |= {"actuator_sigma", "approach", "tension", "tension_sigma", *parts_of(0), WHOLE}
-    whats = ("actuator_sigma", "approach", "tension", "tension_sigma", WHOLE)
-    names |= {f"{what}.{q}" for what in whats for q in actuators}
-    names |= {f"{point}.{axis}" for point in ("target", "attachment") for axis in _AXES}
-    names |= {f"{target}.{axis}" for target in several for axis in _AXES}
-    names |= {f"sigma.{name}" for name in component_names()} | names_of_kinds(table)
-    pairs = itertools.product(component_names(), repeat=2)
-    return names | {f"cov.{a}.{b}" for a, b in pairs} | set(names_in(table))
+    components = {name for each in readings for name, _ in each.components}
+    names = {*actuators, "probe", "contact", *ANGLES, *orientation_in(table.columns)}
+    names |= {f"{point}.{axis}" for point in (*points, *several) for axis in _AXES}
+    for reading in readings:
+        names |= reading.names(table)
+    for field in _FIELDS:
+        names |= field.names(actuators, components)
+    return names
 
 
-def _kind(table: Table, several: tuple[str, ...]) -> Kind:
+def _reading(table: Table, several: tuple[str, ...], readings: Sequence[Reading]) -> Reading:
     """What was measured, by the columns that are there."""
-    names = table.columns.keys()
-    turned = set(names_in(table)) | (set(ANGLES) & names)
-    own = kinds_in(table)
-    groups = {
-        **{title: {title} for title in own},
-        "x, y, z": ({*_AXES} & names) | turned,
-        f"several targets ({', '.join(several)})": set(several),
-    }
-    there = [title for title, columns in groups.items() if columns]
-    if len(there) > 1:
-        raise table.header_error(f"more than one thing measured: {' and '.join(there)}")
-    if not there:
-        return "closure"
-    if own:
-        return next(iter(own.values()))
+    found: dict[str, Reading] = {title: each for each in readings for title in each.found_in(table)}
     if several:
-        return "position"
-    if turned and names.isdisjoint(_AXES):
-        return "orientation"
-    if names.isdisjoint(("x", "y", *turned)):
-        return "height"
-    return "pose" if turned else "position"
+        found[f"several targets ({', '.join(several)})"] = Position()
+    if len(found) > 1:
+        raise table.header_error(f"more than one thing measured: {' and '.join(found)}")
+    return next(iter(found.values()), Closure())
 
 
 def _read_values(
     table: Table,
-    kind: Kind,
+    read: Reading,
     rotation: str | None,
     actuators: FloatArray,
     robot: Actuated | None,
 ) -> FloatArray | None:
     """What was measured, (N, k) or (N,); None without columns of it."""
-    if KINDS[kind].turning is not None and names_in(table) not in ((), ANGLES):
-        places = [table.numbers(axis, "mm")[0] for axis in _AXES] if kind == "pose" else []
+    if read.turning is not None and orientation_in(table.columns) not in ((), ANGLES):
+        places = [table.numbers(*each)[0] for each in read.components[: read.turning]]
         nominal = _nominal(robot, actuators)
         from pkmcal.measurements import orientation_forms  # imports SciPy
 
         return np.column_stack([*places, orientation_forms.read(table, rotation, nominal)])
-    columns = [table.numbers(*component, blank=True)[0] for component in value_columns(table, kind)]
+    columns = [table.numbers(*each, blank=True)[0] for each in read.columns_read(table)]
     if not columns:
         return None
     return columns[0] if len(columns) == 1 else np.stack(columns, axis=1)
@@ -420,26 +384,3 @@ def _nominal(robot: Actuated | None, actuators: FloatArray) -> FloatArray | None
     some = np.unique(np.linspace(0, len(actuators) - 1, _TRIED).astype(int))
     angles[some] = machine.forward(actuators[some]).pose[:, 3:]
     return angles
-
-
-def _read_approach(table: Table, count: int) -> FloatArray | None:
-    """From where each actuator came (rows, n)."""
-    return read_of_actuators(table, "approach", count, table.integers)
-
-
-def _read_tension(table: Table, count: int) -> FloatArray | None:
-    """Tension of what each actuator drives (rows, n), N."""
-    return read_of_actuators(
-        table, "tension", count, lambda name: table.numbers(name, "N", blank=True)[0]
-    )
-
-
-def _read_tension_sigma(table: Table, count: int) -> FloatArray | None:
-    """Standard deviation of that (rows, n), N."""
-    return read_of_actuators(
-        table, "tension_sigma", count, lambda name: table.numbers(name, "N")[0]
-    )
-
-
-def _read_session(table: Table) -> TextArray | None:
-    return np.array(table.texts("session")) if "session" in table.columns else None

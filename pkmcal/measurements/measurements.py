@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from typing import Any
@@ -11,49 +11,30 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pkmcal.arguments import checked_seed, shown, word, words
+from pkmcal.arguments import checked_seed, shown, words
 from pkmcal.arrays import FloatArray, Int64Array, TextArray
 from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.drive_state import DriveState
-from pkmcal.measurements.components import KINDS, Artefact, Kind, components
-from pkmcal.measurements.fields import (
-    actuator_sigma_array,
-    approach_array,
-    attachment_array,
-    filled_tension,
-    integers,
-    names_of_targets,
-    number_of_row,
-    numbers,
-    row_numbers,
-    sessions_array,
-    sigma_array,
-    target_array,
-    temperature_array,
-    tension_array,
-    tension_sigma_array,
-    units_of_actuators,
-    value_of_row,
-    values_array,
-)
-from pkmcal.measurements.kind_fields import (
-    KindFields,
-    TouchDistances,
-    kind_fields,
-    kind_fields_of_row,
-)
-from pkmcal.measurements.listing import deviations, table, title
+from pkmcal.measurements.actuator_sigma import ActuatorSigma
+from pkmcal.measurements.approach import Approach
+from pkmcal.measurements.field import declared, row_fields
+from pkmcal.measurements.former import OF_MEASUREMENTS, adapted
+from pkmcal.measurements.listing import table, title
 from pkmcal.measurements.measurement_writer import write_measurements
+from pkmcal.measurements.numbering import Group, Lines
 from pkmcal.measurements.poses import pose_index
+from pkmcal.measurements.session import Session
+from pkmcal.measurements.sigma import Sigma
+from pkmcal.measurements.targets import TargetIndex, checked_target, names_of_targets
+from pkmcal.measurements.temperature import Temperature
+from pkmcal.measurements.tension import Tension, TensionSigma, filled_tension
+from pkmcal.measurements.time_stamps import Time
 from pkmcal.measurements.tracker import Tracker
 from pkmcal.readings.reading import Reading
+from pkmcal.readings.registry import Kind, as_reading
+from pkmcal.readings.rows import numbers
 from pkmcal.result import Result
-
-_PER_ROW = (
-    "actuators", "values", "sigma", "group", "target_index", "actuator_sigma", "lines", "session",
-    "approach", "tension", "tension_sigma", "other", "run", "touched", "temperature", "time",
-)  # fmt: skip
 
 
 @dataclass(frozen=True, init=False, eq=False, repr=False)
@@ -69,16 +50,18 @@ class Measurements(Result):
         `identify` is given ``unknown="frame"``); see `kind`. NaN: not read there.
         One row is taken as it is: actuators (n,) with values (6,), (3,) or a number, and what else
         has one entry a row likewise.
-    kind : {"position", "pose", "height", "distance", "closure"}
-        "pose": x y z alpha beta gamma of the platform, (N, 6). "position": x y z of the target,
-        (N, 3). "height": z of the target, (N,). "distance": from the target, which here is a
-        fixed point of the base frame, to the attachment, a point of the platform, (N,).
+    kind : str or Reading
+        What was read: a word, or an object of `pkmcal.readings` with what its rows have of their
+        own. "pose": x y z alpha beta gamma of the platform, (N, 6). "position": x y z of the
+        target, (N, 3). "height": z of the target, (N,). "distance", `Distance(attachment)`: from
+        the target, which here is a fixed point of the base frame, to a point of the platform, (N,).
         "closure": nothing, `values` is None; what the actuators read is all that is known.
-        "between": from where the target is in one row to where it is at `other`, (N,).
-        "relative-distance": a distance less the zero of its `run`, (N,). "orientation": alpha beta
-        gamma of the platform, (N, 3). "tilt": how far the x and y axes of a sensor on the platform,
-        whose mounting is not known, point up, (N, 2). "touch": names of what the target touches,
-        (N,), the same where it touches the same; kept as how far off it is, which is 0.
+        `Between(other)`: from where the target is in one row to where it is at the actuators
+        `other`, (N,). `RelativeDistance(attachment, run)`: a distance less the zero of its run,
+        (N,). "orientation": alpha beta gamma of the platform, (N, 3). "tilt": how far the x and y
+        axes of a sensor on the platform, whose mounting is not known, point up, (N, 2).
+        `Angle(joint)`: of a passive joint, (N,). "touch", `Touch(touched, artefact, distances)`:
+        names of what the target touches, (N,); kept as how far off it is, which is 0.
     sigma : scalar, (k,), (N, 1), (N, k) or (N, k, k) array, or Tracker, optional
         Standard deviation of the values in their own units; k is the number of components of the
         kind. (N, k, k) are covariance matrices. One number for poses counts as mm and as rad.
@@ -90,9 +73,6 @@ class Measurements(Result):
         The measured point in the platform frame, mm: one for all rows, one per row, or several
         with `target_index`. None: the platform's origin. For distances: the fixed point of the
         base frame, and required.
-    group : (N,) array of int, optional
-        Rows with the same number are repeats of one pose, as rows with the same actuator readings
-        are.
     target_index : (N,) array of int, optional
         Which of several targets each row measured, counted from 0. With `target=None` the
         targets' places on the platform are not known.
@@ -100,25 +80,21 @@ class Measurements(Result):
         Names of the several targets; "1", "2", … by default.
     actuator_units : str or sequence of str, optional
         "mm" or "rad", one for all or one per actuator. None: not stated; written as mm.
-    attachment : (3,), (N, 3) or (k, 3) array, optional
-        The point in the platform frame, mm, from which distances are measured: of a wire, a ball
-        bar, a leg. One for all rows, one per row, or with `target_index` one for each target.
-        None: the platform's origin.
+    instrument : Reading, optional
+        As `kind` has it; `dataclasses.replace` hands it on.
+    file : str
+        The name of that file.
+    notes : sequence of str
+        What was assumed when they were read, a line each.
+    **fields : array_like
+        One entry a row, of these:
+    group : (N,) array of int, optional
+        Rows with the same number are repeats of one pose, as rows with the same actuator readings
+        are.
     actuator_sigma : scalar, (n,) or (N, n) array, optional
         Standard deviation of what the actuators read, mm or rad. None: they are where they read on
         a machine with as many closures as free coordinates; on one with more, and with rows that
         contradict each other, it is estimated from them. Kept as (N, n).
-    other : (N, n) array, optional
-        Of kind "between": the actuators at the second place.
-    run : (N,) sequence of str, optional
-        Of kind "relative-distance": in which run each was read, by a name. A run has one zero.
-    artefact : {"point", "line", "plane", "sphere"}, optional
-        Of kind "touch": what is touched; "point" by default: a socket, a cone, a hole.
-    touch_distances : mapping of (str, str) to float or (float, float), optional
-        Known distances between touched points, or centres of spheres, mm, or each with its
-        standard deviation, which is 1 µm by default: ``{("A", "B"): 50.0}``.
-    joint : str, optional
-        Of kind "angle": the passive joint that is read.
     session : str or (N,) sequence of str, optional
         When the rows were measured, one word for all or one a row: `identify` may find some
         numbers anew in each session. None: not stated. Kept as (N,).
@@ -141,10 +117,6 @@ class Measurements(Result):
         When each row was measured, in seconds from any start: for the test of drift.
     lines : (N,) array of int, optional
         The line of each row in the file it was read from, to name it by.
-    file : str
-        The name of that file.
-    notes : sequence of str
-        What was assumed when they were read, a line each.
 
     Raises
     ------
@@ -162,118 +134,72 @@ class Measurements(Result):
 
     actuators: FloatArray
     values: FloatArray
-    kind: Kind = "position"
-    sigma: FloatArray | None = None
-    target: FloatArray | None = None
-    group: Int64Array | None = None
-    target_index: Int64Array | None = None
-    target_names: tuple[str, ...] | None = None
+    kind: Kind | str = "position"
+    instrument: Reading = dataclasses.field(default_factory=lambda: as_reading("position"))
     actuator_units: tuple[str, ...] | None = None
-    attachment: FloatArray | None = None
-    actuator_sigma: FloatArray | None = None
-    other: FloatArray | None = None
-    run: TextArray | None = None
-    touched: TextArray | None = None
-    artefact: Artefact | None = None
-    touch_distances: TouchDistances = ()
-    joint: str | None = None
-    session: TextArray | None = None
-    approach: FloatArray | None = None
-    tension: FloatArray | None = None
-    tension_sigma: FloatArray | None = None
-    temperature: FloatArray | None = None
-    time: FloatArray | None = None
-    lines: Int64Array | None = None
+    target: FloatArray | None = None
+    target_names: tuple[str, ...] | None = None
     file: str = ""
     notes: tuple[str, ...] = ()
-    instrument: Reading = KINDS["position"]
-    labels: Mapping[str, TextArray] = dataclasses.field(default_factory=dict)
+    # fields of the rows, in the order of their columns in files
+    actuator_sigma: FloatArray | None = declared(ActuatorSigma())
+    sigma: FloatArray | None = declared(Sigma())
+    target_index: Int64Array | None = declared(TargetIndex())
+    group: Int64Array | None = declared(Group())
+    session: TextArray | None = declared(Session())
+    temperature: FloatArray | None = declared(Temperature())
+    time: FloatArray | None = declared(Time())
+    approach: FloatArray | None = declared(Approach())
+    tension: FloatArray | None = declared(Tension())
+    tension_sigma: FloatArray | None = declared(TensionSigma())
+    lines: Int64Array | None = declared(Lines())
 
     # The types above are those of the attributes; anything array-like is taken.
     def __init__(
         self,
         actuators: ArrayLike,
         values: ArrayLike | None,
-        kind: Kind | Reading = "position",
+        kind: Kind | Reading | str = "position",
         *,
         sigma: ArrayLike | Tracker | None = None,
         target: ArrayLike | None = None,
-        group: ArrayLike | None = None,
         target_index: ArrayLike | None = None,
         target_names: Sequence[str] | None = None,
         actuator_units: str | Sequence[str] | None = None,
-        attachment: ArrayLike | None = None,
-        actuator_sigma: ArrayLike | None = None,
-        other: ArrayLike | None = None,
-        run: Sequence[str] | TextArray | None = None,
-        touched: Sequence[str] | TextArray | None = None,
-        artefact: Artefact | None = None,
-        touch_distances: Mapping[tuple[str, str], Any] | TouchDistances = (),
-        joint: str | None = None,
-        session: str | Sequence[str] | TextArray | None = None,
-        approach: ArrayLike | None = None,
-        tension: ArrayLike | None = None,
-        tension_sigma: ArrayLike | None = None,
-        temperature: ArrayLike | None = None,
-        time: ArrayLike | None = None,
-        lines: ArrayLike | None = None,
+        instrument: Reading | None = None,
         file: str = "",
         notes: Sequence[str] = (),
-        instrument: Reading | None = None,
-        labels: Mapping[str, Sequence[str]] | None = None,
+        **fields: Any,
     ) -> None:
-        if isinstance(kind, Reading):
-            kind, instrument = kind.name, kind
-        word("kind", kind, KINDS)
+        of_rows = row_fields(type(self))
+        stated = {each.name: fields.pop(each.name, None) for each in of_rows}
+        stated |= {"sigma": sigma, "target_index": target_index}
+        if instrument is None or (isinstance(kind, str) and kind != instrument.name):
+            instrument = as_reading(kind)  # type: ignore[arg-type]
+        instrument = adapted("Measurements", instrument, fields, OF_MEASUREMENTS)
         q = numbers("actuators", actuators)
         if q.ndim not in (1, 2) or 0 in q.shape:
             raise ArgumentError(
                 f"actuators must have shape (N, n), or (n,) for one row, not empty; found {q.shape}"
             )
         alone, q = q.ndim == 1, np.atleast_2d(q)
-        given = KindFields(other, run, touched, artefact, touch_distances, joint)
-        if alone:
-            values, given = kind_fields_of_row(kind, values, given)
-        own, values = kind_fields(kind, q.shape, values, given)
-        k = len(components(kind, own["artefact"]))
-        if alone:
-            values = value_of_row(values, kind, k, q.shape[1:])
-            group, target_index, lines, time = map(
-                number_of_row, (group, target_index, lines, time)
-            )
-            if k > 1 and not isinstance(sigma, Tracker) and np.asarray(sigma).shape == (k, k):
-                sigma = np.asarray(sigma)[None]
-        shape = (len(q), k)
-        v = values_array(values, kind, shape)
-        index = None if target_index is None else integers("target_index", target_index, len(q))
-        place = target_array(target, kind, index, len(q))
-        targets = None if place is None or index is None else len(place)
-        fields: dict[str, Any] = {
+        place = None if target is None else numbers("target", target)
+        targets = None if place is None or target_index is None else len(np.atleast_1d(place))
+        own, read = instrument.of_rows(values, q, targets)
+        self.__setstate__({
             "actuators": q,
-            "values": v,
-            "kind": kind,
-            "sigma": None if sigma is None else sigma_array(sigma, kind, shape, v),
-            "target": place,
-            "group": None if group is None else integers("group", group, len(q)),
-            "target_index": index,
-            "target_names": names_of_targets(target_names, index, place),
-            "actuator_units": units_of_actuators(actuator_units, q.shape[1]),
-            "attachment": attachment_array(attachment, kind, targets, len(q)),
-            "actuator_sigma": actuator_sigma_array(actuator_sigma, q.shape),
-            **own,
-            "session": sessions_array(session, len(q)),
-            "approach": approach_array(approach, q),
-            "tension": tension_array(tension, q.shape),
-            "tension_sigma": tension_sigma_array(tension_sigma, tension, q.shape),
-            "temperature": temperature_array(temperature, q.shape),
-            "time": None if time is None else row_numbers("time", time, len(q)),
-            "lines": None if lines is None else integers("lines", lines, len(q)),
+            "values": _values(read, own, q.shape, alone and read is values),
+            "kind": own.name,
+            "instrument": own,
+            "actuator_units": _units(actuator_units, q.shape[1]),
             "file": file,
             "notes": words("notes", notes),
-            "instrument": instrument or KINDS[kind],
-            "labels": {k: np.array(each) for k, each in (labels or {}).items()},
-        }
-        self.__setstate__(fields)
+        })  # fmt: skip
+        for each in of_rows:
+            given = stated[each.name]
+            self.__setstate__({each.name: None if given is None else each.kept(given, self)})
+        self.__setstate__({"target": checked_target(place, self)})
+        self.__setstate__({"target_names": names_of_targets(target_names, self)})
 
     def __setstate__(self, fields: dict[str, Any]) -> None:
         for name, value in fields.items():
@@ -287,12 +213,12 @@ class Measurements(Result):
     @property
     def components(self) -> tuple[str, ...]:
         """Names of the components of one value: ("x", "y", "z") for a position."""
-        return tuple(name for name, _ in components(self.kind, self.artefact))
+        return tuple(name for name, _ in self.instrument.components)
 
     @property
     def units(self) -> tuple[str, ...]:
-        """Units of the components, "mm" or "rad"."""
-        return tuple(unit for _, unit in components(self.kind, self.artefact))
+        """Units of the components: "mm", "rad" or those of a reading of your own."""
+        return self.instrument.units
 
     @property
     def targets(self) -> FloatArray:
@@ -309,18 +235,26 @@ class Measurements(Result):
                 " known; give them as an array, or identify them with --target unknown"
                 ' (unknown="target")'
             )
-        return self._of_rows(self.target)
+        return self.of_points(self.target)
 
     @property
     def attachments(self) -> FloatArray:
         """The attachment of every row, (N, 3) in mm; zeros where none was given."""
-        return self._of_rows(self.attachment)
+        return self.of_points(self.attachment)
 
-    def _of_rows(self, place: FloatArray | None) -> FloatArray:
+    def of_points(self, place: FloatArray | None) -> FloatArray:
+        """A point of every row (N, 3), of one, one a row or one for each target; zeros of None."""
         place = np.zeros(3) if place is None else place
         if self.target_index is not None and place.ndim == 2:
             place = place[self.target_index]
         return np.array(np.broadcast_to(place, (len(self), 3)), order="C")
+
+    def __getattr__(self, name: str) -> Any:
+        """Of the instrument: `run`, `touched`, `attachment` …; None where it has none."""
+        if name in OF_MEASUREMENTS and "instrument" in vars(self):
+            none = () if name == "touch_distances" else None
+            return getattr(self.instrument, OF_MEASUREMENTS[name], none)
+        raise AttributeError(f"{type(self).__name__} has no attribute {name!r}")
 
     @property
     def pose_index(self) -> Int64Array:
@@ -358,17 +292,13 @@ class Measurements(Result):
             ) from None
         if picked.ndim != 1 or len(picked) == 0:
             raise ArgumentError(f"rows must choose at least one of {len(self)} measurements")
-        per_row: dict[str, Any] = {
-            name: None if value is None else value[picked]
-            for name, value in vars(self).items()
-            if name in _PER_ROW
-        }
-        per_row["labels"] = {name: each[picked] for name, each in self.labels.items()}
-        for name in ("target", "attachment"):
-            place = getattr(self, name)
-            if place is not None and place.ndim == 2 and self.target_index is None:
-                per_row[name] = place[picked]
-        return dataclasses.replace(self, **per_row)
+        fields = {each.name: each.of(self) for each in row_fields(type(self))}
+        parts: dict[str, Any] = {k: None if of is None else of[picked] for k, of in fields.items()}
+        parts["instrument"] = self.instrument.select(picked, self.target_index is not None)
+        if self.target is not None and self.target.ndim == 2 and self.target_index is None:
+            parts["target"] = self.target[picked]
+        q, values = self.actuators[picked], self.values[picked]
+        return dataclasses.replace(self, actuators=q, values=values, **parts)
 
     def split(self, holdout: float, seed: int = 0) -> tuple[Measurements, Measurements]:
         """Measurements to fit and measurements to hold out, drawn at random by whole poses.
@@ -426,29 +356,61 @@ class Measurements(Result):
         columns: dict[str, Any] = {f"q{i + 1}": q for i, q in enumerate(self.actuators.T)}
         values = self.values.reshape(len(self), -1)
         columns |= dict(zip(self.components, values.T, strict=True))
-        sigma = deviations(self)
-        if sigma is not None:
-            names = (f"sigma.{name}" for name in self.components)
-            columns |= dict(zip(names, sigma.T, strict=True))
-        if self.other is not None:
-            columns |= {f"to.q{i + 1}": q for i, q in enumerate(self.other.T)}
-        columns |= {} if self.run is None else {"run": self.run}
-        columns |= {} if self.touched is None else {"touch": self.touched}
-        if self.target_index is not None and self.target_names is not None:
-            columns["target"] = [self.target_names[i] for i in self.target_index]
-        if self.group is not None:
-            columns["group"] = self.group
-        if self.session is not None:
-            columns["session"] = self.session
-        if self.approach is not None:
-            columns |= {f"approach.q{i + 1}": each for i, each in enumerate(self.approach.T)}
-        if self.tension is not None:
-            columns |= {f"tension.q{i + 1}": each for i, each in enumerate(self.tension.T)}
-        if self.tension_sigma is not None:
-            pairs = enumerate(self.tension_sigma.T, 1)
-            columns |= {f"tension_sigma.q{i}": each for i, each in pairs}
-        return columns
+        units = self.actuator_units or ("",) * self.actuators.shape[1]
+        columns |= {each.name: each.values for each in self.instrument.columns(units)}
+        fields = (column for each in row_fields(type(self)) for column in each.framed(self))
+        return columns | {column.name: column.values for column in fields}
 
     def _parts(self) -> Iterator[str | Table]:
         yield title(self)
         yield table(self)
+
+
+def _values(
+    given: ArrayLike | None, instrument: Reading, rows: tuple[int, ...], alone: bool
+) -> FloatArray:
+    """What was read, (N, k) or (N,); NaN where nothing was, of orientations as a whole."""
+    kind, k = instrument.name, len(instrument.components)
+    if given is None:
+        if k:
+            raise ArgumentError(
+                f"values of kind {kind!r} must be given, found None: that goes with 'closure'"
+            )
+        return np.empty((rows[0], 0))
+    values = numbers("values", given, blank=True)
+    if alone:
+        if values.shape != ((k,) if k != 1 else ()):
+            what = f"have shape ({k},)" if k != 1 else "be a number"
+            raise ArgumentError(
+                f"values of kind {kind!r} must {what} for one row of actuators {rows[1:]}, or"
+                f" actuators have shape (N, n); found {values.shape}"
+            )
+        values = values[None]
+    expected = (rows[0], k) if k != 1 else rows[:1]
+    if values.shape != expected:
+        raise ArgumentError(
+            f"values of kind {kind!r} must have shape {expected} for {rows[0]} rows of"
+            f" actuators; found {values.shape}"
+        )
+    if (first := instrument.turning) is not None:
+        angles = np.isnan(values[:, first:])
+        part = angles.any(axis=1) & ~angles.all(axis=1)
+        if part.any():
+            raise ArgumentError(
+                "values: an orientation has three angles or none; found one left out in row"
+                f" {int(np.argmax(part))}"
+            )
+    return values
+
+
+def _units(given: str | Sequence[str] | None, count: int) -> tuple[str, ...] | None:
+    """One unit per actuator, "mm" or "rad"; None where none is given."""
+    if given is None:
+        return None
+    units = words("actuator_units", given)
+    units = units * count if isinstance(given, str) else units
+    if len(units) != count or any(unit not in ("mm", "rad") for unit in units):
+        raise ArgumentError(
+            f'actuator_units must be "mm" or "rad" for {count} actuators; found {given!r}'
+        )
+    return units

@@ -12,9 +12,16 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pkmcal.arrays import FloatArray
-from pkmcal.files.column_names import EULER, MATRIX, NUMBERED, QUATERNION, VECTOR
+from pkmcal.files.column_names import (
+    EULER,
+    MATRIX,
+    NUMBERED,
+    QUATERNION,
+    VECTOR,
+    orientation_in,
+)
 from pkmcal.files.csv_table import Table
-from pkmcal.measurements.orientation_columns import ORDERS, QUATERNIONS, WORDS, names_in
+from pkmcal.measurements.table_layout import ORDERS, QUATERNIONS, ROTATIONS
 
 _UNIT = 0.02  # by so much the length of a quaternion or of a row of a matrix may differ from 1
 _ALIKE = 1.01  # of misfits that do not tell two conventions apart
@@ -29,7 +36,7 @@ def read(table: Table, rotation: str | None, nominal: FloatArray | None) -> Floa
     Parameters
     ----------
     table : Table
-        With the columns of `names_in`.
+        With the columns of `orientation_in`.
     rotation : str or None
         How they are stated, where headings do not say.
     nominal : ndarray (N, 3) or None
@@ -40,7 +47,7 @@ def read(table: Table, rotation: str | None, nominal: FloatArray | None) -> Floa
     ValueError
         The convention is not stated, or another one fits the machine; no unit quaternion.
     """
-    names = names_in(table)
+    names = orientation_in(table.columns)
     given = _numbers(table, names)
     forms = _forms(names, given)
     said = " ".join(repr(table.columns[name].name) for name in names)
@@ -122,7 +129,7 @@ def _chosen(table: Table, said: str, forms: dict[str, Rotation], rotation: str |
         return next(iter(forms))
     if rotation in forms:
         return rotation
-    if len(forms) == 1 and rotation not in WORDS:
+    if len(forms) == 1 and rotation not in ROTATIONS:
         return next(iter(forms))  # the headings say more
     raise table.header_error(f"columns {said} are not {rotation!r}; expected {', '.join(forms)}")
 

@@ -12,9 +12,8 @@ def targets(measured: Measurements) -> IntArray:
     """Which target each row is of, (N,), counted from 0: by its index, or by its place."""
     if measured.target_index is not None:
         return np.asarray(measured.target_index, dtype=np.intp)
-    if measured.labels:  # what each row saw
-        names = np.column_stack([*measured.labels.values()])
-        return np.unique(names, axis=0, return_inverse=True)[1].reshape(-1)
+    if (subject := measured.instrument.subject(measured)) is not None:
+        return np.unique(subject, return_inverse=True)[1].reshape(-1)
     place = measured.target
     if place is None or place.ndim == 1:
         return np.zeros(len(measured), dtype=np.intp)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import fnmatch
+import itertools
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -17,12 +18,25 @@ from pkmcal.files.column_names import BESIDE, canonical
 from pkmcal.files.csv_table import Table
 from pkmcal.files.header import parted
 from pkmcal.measurements.actuator_columns import actuators_in
-from pkmcal.measurements.point_names import split
 
 _SLIP = 0.8  # how like a known name a mistyped one is, as difflib counts
 _SHOWN = 8  # names of columns in a message
 _LAST_NUMBER = re.compile(r"([0-9]{1,9})\D*$")
 _OF_NUMBERS = re.compile(r"[+-]?[0-9.,]+")
+_PARTING = r"[\s_\-.:/]+"
+_FORMS = (
+    re.compile(rf"(?P<first>.*?[0-9]+){_PARTING}(?P<last>\S.*)"),  # P01_SMR1
+    re.compile(rf"(?P<first>.*[^\s_\-.:/]){_PARTING}(?P<last>\S*[0-9]+)"),  # SMR-A_P01
+)
+_TARGET = re.compile(r"smr|target|tgt|refl|marker|prism|nest|ball", re.IGNORECASE)
+ORDERS = [  # of axes; capitals: each about the turned axis
+    "".join(order)
+    for letters in ("xyz", "XYZ")
+    for order in itertools.product(letters, repeat=3)
+    if order[0] != order[1] != order[2]
+]
+QUATERNIONS = ("wxyz", "xyzw")
+ROTATIONS = (*QUATERNIONS, "rotvec")
 
 
 @dataclass(frozen=True)
@@ -71,6 +85,22 @@ def layout(
     return Layout(
         as_words("ignore", ignore), dict(rename or {}), as_words("header", header), stated
     )
+
+
+def checked_rotation(rotation: str | None) -> str | None:
+    """One of the words for how orientations are stated.
+
+    Raises
+    ------
+    ValueError
+        Another word.
+    """
+    if rotation is not None and rotation not in (*ORDERS, *ROTATIONS):
+        raise ArgumentError(
+            f"rotation must be an order of axes such as ZYX (each about the turned axis) or xyz"
+            f" (about fixed axes), rotvec, wxyz or xyzw; found {rotation!r}"
+        )
+    return rotation
 
 
 def open_table(
@@ -122,6 +152,35 @@ def open_table(
     names = canonical(headings, joints, elsewhere)
     table.rename(lambda name: names[renamed.get(name, name)])
     return table
+
+
+def split(names: Sequence[str]) -> tuple[list[str], list[str]] | None:
+    """Poses and targets of points named after both; None where names are not made so.
+
+    The part with fewer different words is the target: it is seen in several poses.
+
+    Examples
+    --------
+    >>> split(["P01_SMR1", "P01_SMR2", "P02_SMR1"])
+    (['P01', 'P01', 'P02'], ['SMR1', 'SMR2', 'SMR1'])
+    >>> split(["A-1", "A-2", "B-1", "B-2", "A-3"])
+    (['1', '2', '1', '2', '3'], ['A', 'A', 'B', 'B', 'A'])
+    >>> split(["P01", "P02"])
+    """
+    for form in _FORMS:
+        matches = [form.fullmatch(name) for name in names]
+        if not all(matches):
+            continue
+        first = [match["first"] for match in matches if match]
+        last = [match["last"] for match in matches if match]
+        poses, targets = first, last
+        by_name = len(set(filter(_TARGET.search, first))), len(set(filter(_TARGET.search, last)))
+        fewer = len(set(first)) - len(set(last))
+        if fewer < 0 or (fewer == 0 and by_name[0] > by_name[1]):
+            poses, targets = last, first
+        if len(set(poses)) > 1 and len(set(targets)) < len(names):
+            return poses, targets
+    return None
 
 
 def split_names(table: Table) -> None:
@@ -189,7 +248,7 @@ def leave_out_unknown(table: Table, known: Collection[str], also: Collection[str
     ValueError
         A heading that is nearly a known one.
     """
-    table.leave_out(BESIDE)
+    table.leave_out([name for name in BESIDE if name not in known])
     unknown = [name for name in table.columns if name not in known]
     for name in unknown:
         written = table.columns[name].name

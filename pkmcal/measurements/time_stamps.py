@@ -1,16 +1,19 @@
-"""Time-stamps of instruments and controllers, in seconds."""
+"""When each row was measured, and time-stamps of instruments and controllers, in seconds."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from datetime import datetime, timezone
+from typing import Any
 
 import numpy as np
 
 from pkmcal.arrays import FloatArray
 from pkmcal.files.csv_table import Table
+from pkmcal.measurements.field import Field, row_numbers
+from pkmcal.readings.reading import Reading
 
 _CLOCKS = ("%H:%M:%S.%f", "%I:%M:%S.%f %p", "%H:%M")
 _DATES = ("%Y-%m-%d", "%Y/%m/%d", "%Y%m%d", "%d.%m.%Y", "%m/%d/%Y", "%d/%m/%Y", "%d-%b-%Y")
@@ -18,6 +21,25 @@ _FORMS = (*_CLOCKS, *(f"{date} {clock}" for date in _DATES for clock in _CLOCKS)
 _ZONE = re.compile(r"\s*(?:Z|[+-][0-9]{2}:?[0-9]{2})$")
 _FINER = re.compile(r"([.,][0-9]{6})[0-9]+")  # of a second, beyond what is kept
 _WHOLE = re.compile(r"(:[0-9]{2}:[0-9]{2})(?![.,:0-9])")  # seconds without a fraction
+
+
+class Time(Field):
+    """When each row was measured, in seconds from any start."""
+
+    def kept(self, given: Any, m: Any) -> FloatArray:
+        """Seconds (N,)."""
+        return row_numbers(self.name, given, len(m))
+
+    def names(self, actuators: Collection[str], components: Collection[str]) -> set[str]:
+        """Time-stamps, and the date where they are of a time of day."""
+        return {self.name, "date"}
+
+    def read(self, table: Table, instrument: Reading, units: Sequence[str]) -> FloatArray | None:
+        """Seconds, where the time-stamps can be read."""
+        if self.name not in table.columns:
+            return None
+        found = seconds(with_date(table, table.columns[self.name].cells))
+        return None if found is None else found[0]
 
 
 def seconds(cells: Sequence[str]) -> tuple[FloatArray, str] | None:
@@ -48,14 +70,6 @@ def seconds(cells: Sequence[str]) -> tuple[FloatArray, str] | None:
     if any(not np.array_equal(steps[0], other) for other in steps[1:]):
         return None  # 03/04 to 04/04: a day or a month
     return first, since
-
-
-def times_of(table: Table) -> FloatArray | None:
-    """Seconds of each row of a table, where it has a column of them that can be read."""
-    if "time" not in table.columns:
-        return None
-    found = seconds(with_date(table, table.columns["time"].cells))
-    return None if found is None else found[0]
 
 
 def with_date(table: Table, cells: Sequence[str]) -> Sequence[str]:

@@ -3,25 +3,27 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pkmcal.arguments import checked_seed, did_you_mean, number, shown, word
+from pkmcal.arguments import checked_seed, number, shown
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray
 from pkmcal.display import first_rows
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
+from pkmcal.kinematics.calibratable import ArmMachine, Solvable
+from pkmcal.kinematics.drive_state import DriveState
 from pkmcal.kinematics.robot import Robot
-from pkmcal.measurements.components import KINDS, Artefact, Kind, components
-from pkmcal.measurements.fields import numbers
+from pkmcal.measurements.former import OF_MEASURE, adapted
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.measurements.observation import corrected
 from pkmcal.measurements.tracker import Tracker
-from pkmcal.readings.calibratable import ArmMachine, Solvable
-from pkmcal.readings.reading import At, Reading
+from pkmcal.readings.reading import Reading
+from pkmcal.readings.registry import Kind, as_reading
+from pkmcal.readings.rows import numbers
+from pkmcal.readings.unknowns import POINT
 
 _ARM = 200.0  # mm; an instrument good to 0.02 mm over it is good to 1e-4 rad
 
@@ -83,17 +85,9 @@ class VirtualMachine:
         kind: Kind | Reading = "position",
         target: ArrayLike | None = None,
         *,
-        labels: Mapping[str, Sequence[str]] | None = None,
-        attachment: ArrayLike | None = None,
-        other: ArrayLike | None = None,
-        run: Sequence[str] | None = None,
-        mounting: ArrayLike = (0.0, 0.0, 0.0),
-        touched: Mapping[str, ArrayLike] | None = None,
-        artefact: Artefact = "point",
-        touches: Sequence[str] | None = None,
-        joint: str | None = None,
         approach: ArrayLike | None = None,
         tension: ArrayLike | None = None,
+        **former: Any,
     ) -> Measurements:
         """Command actuators and measure where the machine goes.
 
@@ -101,29 +95,12 @@ class VirtualMachine:
         ----------
         q : (N, n) or (n,) array
             Actuator coordinates, mm or rad.
-        kind : str
-            What the instrument reads; see `Measurements`.
+        kind : str or Reading
+            What the instrument reads; see `Measurements`. Objects of `pkmcal.readings` state what
+            a simulation has to know beside: how a sensor is mounted, where touched things are.
         target : (3,) or (N, 3) array, optional
             The measured point in the platform frame, mm; by default the platform's origin. For
             distances the fixed point of the base frame, and required.
-        attachment : (3,) or (N, 3) array, optional
-            The point in the platform frame, mm, from which distances are measured.
-        other : (N, n) array, optional
-            Of kind "between": the actuators at the second place.
-        run : (N,) sequence of str, optional
-            Of kind "relative-distance": the run of each row. The first row of a run reads 0.
-        mounting : (3,) array
-            Of kinds "tilt" and "orientation": α β γ of the sensor on the platform, rad.
-        touches : (N,) sequence of str, optional
-            Of kind "touch": the name of what each row touches. The values are how far off it the
-            machine stands, as the deflection of a probe reads it.
-        touched : mapping of str to array, optional
-            Where that is in the base frame: of a point or sphere (3,) or (4,) with the radius, of a
-            line or plane a pose (6,), whose z it is along or normal to.
-        artefact : {"point", "line", "plane", "sphere"}
-            What it is.
-        joint : str, optional
-            Of kind "angle": the passive joint, a name of ``robot.passive_names``.
         approach : scalar, (n,) or (N, n) array, or "order", optional
             From where the actuators come; see `Measurements`.
         tension : scalar, (n,) or (N, n) array, optional
@@ -138,90 +115,65 @@ class VirtualMachine:
         ------
         ValueError
             Rows that the machine cannot reach, by number; or an argument that does not fit.
+
+        Examples
+        --------
+        >>> import pkmcal as pk
+        >>> robot = pk.load("hexapod")
+        >>> tilts = pk.readings.Tilt(mounting=[0, 0, 0.5])
+        >>> pk.VirtualMachine(robot).measure(robot.inverse(robot.home), tilts).units
+        ('rad', 'rad')
         """
         actuators = np.atleast_2d(numbers("q", q))
         n = getattr(self._machine, "n_actuators", actuators.shape[-1])
         if actuators.ndim != 2 or actuators.shape[1] != n or not actuators.size:
             raise ArgumentError(f"q must have shape (N, {n}) or ({n},); found {np.shape(q)}")
-        if not isinstance(kind, Reading):
-            kind = KINDS[word("kind", kind, KINDS)]
+        instrument = adapted("measure", as_reading(kind), former, OF_MEASURE)
         if tension is not None:
             numbers("tension", tension)  # of what is driven it is known
-        touching = kind.name == "touch"
-        width = len(components(kind.name, artefact if touching else None))
+        width = len(instrument.components)
         blank = Measurements(
             actuators,
-            np.zeros((len(actuators), width) if width > 1 else len(actuators)),
-            kind,
+            np.zeros((len(actuators), width) if width != 1 else len(actuators)),
+            instrument,
             target=target,
             actuator_units=getattr(self._machine, "actuator_units", None),
-            attachment=attachment,
             approach=approach,
             tension=tension,
-            other=other,
-            run=run,
-            touched=touches,
-            artefact=artefact if touching else None,
-            joint=joint,
-            labels=labels,
         )
-        exact = self._exact(blank, mounting, touched)
-        if blank.run is not None:
-            first = np.unique(blank.run, return_index=True, return_inverse=True)[1:]
-            exact -= exact[first[0]][first[1].reshape(-1)]
+        exact = blank.instrument.simulated(blank, _Solving(self._machine, blank.drive_state))
         noise, sigma = self._drawn(blank, exact)
-        values = corrected(kind.name, exact, noise).reshape(blank.values.shape)
-        return dataclasses.replace(blank, values=values, sigma=sigma)
-
-    def _exact(
-        self, blank: Measurements, mounting: ArrayLike, touched: Mapping[str, ArrayLike] | None
-    ) -> FloatArray:
-        """What would be read without noise, (N, k)."""
-        machine = self._machine
-        if isinstance(machine, Robot):
-            machine = blank.drive_state.of(machine)
-        solved = _solved(machine, blank.actuators, "q")
-        if blank.joint is not None:
-            names = getattr(self._machine, "passive_names", ())
-            if blank.joint not in names:
-                known = did_you_mean(blank.joint, names)
-                raise ArgumentError(f"joint: no passive joint is called {blank.joint!r}{known}")
-            return np.array(solved.passive[:, [names.index(blank.joint)]])
-        at = At(
-            np.asarray(solved.pose),
-            None if blank.other is None else _solved(machine, blank.other, "other").pose,
-            along=np.full(len(blank), 2),
-            artefact=blank.artefact,
-        )
-        return blank.instrument.predict(at, **self._arguments(blank, mounting, touched)).values
-
-    def _arguments(
-        self, blank: Measurements, mounting: ArrayLike, touched: Mapping[str, ArrayLike] | None
-    ) -> dict[str, FloatArray]:
-        """What the readings depend on beside the pose, as `predict` takes it."""
-        truth = {"mounting": mounting, "touched": touched}
-        return blank.instrument.simulated(blank, truth)
+        values = blank.instrument.corrected(exact, noise).reshape(blank.values.shape)
+        known = blank.instrument.measured()
+        return dataclasses.replace(blank, instrument=known, values=values, sigma=sigma)
 
     def _drawn(self, blank: Measurements, exact: FloatArray) -> tuple[FloatArray, Any]:
         """Noise (N, k), and the sigma to state."""
         drawn = self._random.standard_normal(exact.shape)
         if isinstance(self.noise, Tracker):
-            if blank.kind != "position":
+            if blank.instrument.components != POINT:
                 raise ArgumentError(f"kind: a tracker measures positions, found {blank.kind!r}")
             covariance = self.noise.covariance(exact)
             return (np.linalg.cholesky(covariance) @ drawn[:, :, None])[:, :, 0], self.noise
         deviations = {"rad": self.angle_noise}  # every other unit: the instrument's noise
         sigma = np.array([deviations.get(unit, self.noise) for unit in blank.units])
-        return sigma * drawn, sigma if (sigma > 0).all() else None
+        return sigma * drawn, sigma if len(sigma) and (sigma > 0).all() else None
 
 
-def _solved(machine: Solvable, actuators: FloatArray, argument: str) -> Any:
-    """What the machine's forward kinematics give, where they do of every row."""
-    solved = machine.forward(actuators)
-    failed = np.flatnonzero(~np.asarray(solved.ok)).tolist()
-    if len(failed):
-        raise ArgumentError(
-            f"{argument}: {len(failed)} of {len(actuators)} rows have no pose on the true machine"
-            f" (rows {first_rows(failed, 10)})"
-        )
-    return solved
+@dataclass(frozen=True)
+class _Solving:
+    """The forward kinematics of a machine in the state of its drives."""
+
+    machine: Any
+    state: DriveState
+
+    def __call__(self, actuators: FloatArray, argument: str) -> Any:
+        moved = self.state.of(self.machine) if isinstance(self.machine, Robot) else self.machine
+        solved = moved.forward(actuators)
+        failed = np.flatnonzero(~np.asarray(solved.ok)).tolist()
+        if failed:
+            raise ArgumentError(
+                f"{argument}: {len(failed)} of {len(actuators)} rows have no pose on the true"
+                f" machine (rows {first_rows(failed, 10)})"
+            )
+        return solved

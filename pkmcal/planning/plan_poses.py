@@ -16,10 +16,10 @@ from pkmcal.core.library import POSE
 from pkmcal.display import Table, fixed
 from pkmcal.estimation.parameters import Parameters, Prior
 from pkmcal.exceptions import ArgumentError
+from pkmcal.kinematics.calibratable import Calibratable, as_machine
 from pkmcal.kinematics.perturbed import ideal
 from pkmcal.kinematics.pulled import pulled
 from pkmcal.kinematics.robot import Robot
-from pkmcal.measurements.components import Kind
 from pkmcal.measurements.tracker import Tracker
 from pkmcal.planning.optimal_design import CRITERIA, Criterion
 from pkmcal.planning.planned import (
@@ -32,11 +32,12 @@ from pkmcal.planning.planned import (
 )
 from pkmcal.planning.tour import short_tour
 from pkmcal.planning.travel_weight import with_travel
-from pkmcal.readings.calibratable import Calibratable, as_machine
 from pkmcal.readings.reading import Reading
+from pkmcal.readings.registry import KINDS, Kind, as_reading
 from pkmcal.result import Result
 
-PLANNED: tuple[Kind, ...] = ("position", "pose", "height", "distance", "orientation", "closure")
+Planned = Kind | Reading
+PLANNED: tuple[Kind, ...] = tuple(each for each, of in KINDS.items() if of.planned)
 
 _DRAWS = 25  # of poses at random, to compare a plan with
 _ERROR = 0.5  # mm; what numbers may be off by that have no prior
@@ -101,8 +102,8 @@ class Plan(Result):
     parameters: tuple[str, ...]
     travel: float = float("nan")
     own_frame: bool = False
-    kinds: tuple[Kind, ...] = ()
-    target: Mapping[Kind, FloatArray] = field(default_factory=dict)
+    kinds: tuple[str, ...] = ()
+    target: Mapping[str, FloatArray] = field(default_factory=dict)
     travel_weight: float = 0.0
     predicted_unweighted: float = float("nan")
     travel_unweighted: float = float("nan")
@@ -162,9 +163,9 @@ def plan_poses(
     accuracy: float | None = None,
     targets: ArrayLike | None = None,
     criterion: Criterion = "prediction",
-    kind: Kind | Mapping[Kind, int] = "position",
-    target: ArrayLike | Mapping[Kind, ArrayLike] | None = None,
-    noise: float | Tracker | Mapping[Kind, float | Tracker] = 0.02,
+    kind: Planned | Mapping[Any, int] = "position",
+    target: ArrayLike | Mapping[Any, ArrayLike] | None = None,
+    noise: float | Tracker | Mapping[Any, float | Tracker] = 0.02,
     free: str | Sequence[str] | None = None,
     prior: Prior = None,
     unknown: Unknown | Sequence[Unknown] = (),
@@ -197,10 +198,11 @@ def plan_poses(
         What is made least: the predicted error at the targets, the volume of the parameters'
         confidence region (largest det of the information), or the sum of their variances, scaled
         to mm at the machine.
-    kind : {"position", "pose", "height", "distance", "orientation", "closure"}
-        What will be measured; see `Measurements`. "closure" is nothing but the actuators, of a
-        machine that has more of them than ways to move. Of several kinds how many poses of each,
-        instead of `count`: ``{"position": 20, "distance": 10}``.
+    kind : {"position", "pose", "height", "distance", "orientation", "tilt", "closure"} or Reading
+        What will be measured, a word or an object of `pkmcal.readings`; see `Measurements`.
+        "closure" is nothing but the actuators, of a machine that has more of them than ways to
+        move. Of several kinds how many poses of each, instead of `count`:
+        ``{"position": 20, "distance": 10}``.
     target : array_like (3,) or (k, 3), or a mapping of kinds to them, optional
         The measured point of the platform, mm, or several that are measured at every pose. For
         distances the fixed points of the base.
@@ -301,8 +303,8 @@ def plan_poses(
         parameters=parameters.names,
         travel=travel,
         own_frame=own_frame,
-        kinds=tuple(kinds[sort[i]] for i in found),
-        target=points,
+        kinds=tuple(_name(kinds[sort[i]]) for i in found),
+        target={_name(each): place for each, place in points.items()},
         travel_weight=weight,
         predicted_unweighted=unweighted[0],
         travel_unweighted=unweighted[1],
@@ -311,8 +313,8 @@ def plan_poses(
 
 
 def _counts(
-    kind: Kind | Mapping[Kind, int], count: object, accuracy: object
-) -> dict[Kind, int | None]:
+    kind: Planned | Mapping[Any, int], count: object, accuracy: object
+) -> dict[Planned, int | None]:
     """How many poses of each kind; None where an accuracy decides."""
     if isinstance(kind, Mapping):
         if not kind or count is not None or accuracy is not None:
@@ -320,14 +322,20 @@ def _counts(
                 "kind: a mapping says how many poses of each kind, and goes without count and"
                 f" accuracy; found {kind!r}"
             )
-        return {word("kind", each, PLANNED): n for each, n in kind.items()}
-    if not isinstance(kind, Reading):
-        word("kind", kind, PLANNED)
+        return {_known(each): n for each, n in kind.items()}
     if (count is None) == (accuracy is None):
         raise ArgumentError(
             "give either count, how many poses, or accuracy, the error wanted in mm"
         )
-    return {kind: count}  # type: ignore[dict-item]
+    return {_known(kind): count}  # type: ignore[dict-item]
+
+
+def _known(kind: Planned) -> Planned:
+    return kind if isinstance(kind, Reading) else word("kind", kind, PLANNED)
+
+
+def _name(kind: Planned) -> str:
+    return as_reading(kind).name
 
 
 def _weight(given: object, accuracy: object, criterion: Criterion) -> float:
@@ -339,15 +347,17 @@ def _weight(given: object, accuracy: object, criterion: Criterion) -> float:
     return weight
 
 
-def _of(name: str, given: Any, kind: Kind, kinds: Sequence[Kind]) -> Any:
+def _of(name: str, given: Any, kind: Planned, kinds: Sequence[Planned]) -> Any:
     """What was given of one kind: one for all, or by kind."""
     if not isinstance(given, Mapping):
         return given
     for each in given:
         if each not in kinds:
-            raise ArgumentError(f"{name}: the plan has {', '.join(kinds)}; found {each!r}")
+            raise ArgumentError(
+                f"{name}: the plan has {', '.join(map(_name, kinds))}; found {each!r}"
+            )
     if not given or (kind not in given and name == "noise"):
-        raise ArgumentError(f"{name}: of {kind} not stated; found {given!r}")
+        raise ArgumentError(f"{name}: of {_name(kind)} not stated; found {given!r}")
     return given.get(kind)
 
 

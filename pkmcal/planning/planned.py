@@ -19,14 +19,14 @@ from pkmcal.estimation.parameters import Asked, Parameters, Prior
 from pkmcal.estimation.starts import with_starts
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics import pose_steps
+from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.kinematics.robot import Robot
-from pkmcal.measurements.components import Kind
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.tracker import Tracker
 from pkmcal.measurements.virtual_machine import VirtualMachine
 from pkmcal.planning.optimal_design import Criterion, Design
-from pkmcal.readings.calibratable import Calibratable
 from pkmcal.readings.reading import Reading
+from pkmcal.readings.registry import Kind, as_reading
 from pkmcal.statistics.linear_fit import column_basis
 
 Unknown = Literal["frame", "target"]
@@ -38,7 +38,7 @@ _UNIDENTIFIABLE = 1e-3  # mm a target moves per mm along an unidentifiable combi
 def planned(
     robot: Calibratable,
     q: FloatArray,
-    kind: Kind,
+    kind: Kind | Reading,
     several: FloatArray | None,
     noise: float | Tracker,
     actuator_noise: ArrayLike | None,
@@ -56,27 +56,30 @@ def planned(
             " measured, too: state how well they are read"
         )
     count = 1 if several is None else len(several)
-    of_pose: dict[str, list[str]] = kind.of_each_pose() if isinstance(kind, Reading) else {}
-    count = max([count, *map(len, of_pose.values())])
-    labels = {name: each * len(q) for name, each in of_pose.items()}
+    instrument = as_reading(kind)
+    if needed := (*instrument.per_row, *instrument.labels):
+        raise ArgumentError(
+            f"kind: {instrument.noun()} state {needed[0]} for every row, and poses of a plan have"
+            " none yet"
+        )
     rows = np.repeat(q, count, axis=0)
-    if kind == "closure":
+    if not instrument.components:
         if not surplus:
             raise ArgumentError(
                 f"kind: poses of {robot.name} follow from its actuators, which alone say nothing of"
                 " its geometry: measure something else"
             )
-        measured = Measurements(rows, None, kind, actuator_units=robot.actuator_units)
+        measured = Measurements(rows, None, instrument, actuator_units=robot.actuator_units)
     else:
         places = None if several is None else np.tile(several, (len(q), 1))
-        measured = VirtualMachine(robot, noise).measure(rows, kind, places, labels=labels)
+        measured = VirtualMachine(robot, noise).measure(rows, instrument, places)
         if measured.sigma is None:
             raise ArgumentError(
                 f"noise must be above 0, found {noise}: without it any poses will do"
             )
         # a frame laid through noise is tilted by as much as heights can tell, and what is never
         # seen of a level machine would seem to be
-        exact = VirtualMachine(robot, 0.0).measure(rows, kind, places, labels=labels)
+        exact = VirtualMachine(robot, 0.0).measure(rows, instrument, places)
         measured = replace(measured, values=exact.values)
         if several is not None:
             index = np.tile(np.arange(count), len(q))

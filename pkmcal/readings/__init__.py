@@ -1,0 +1,20 @@
+"""Instruments: what is read of a machine at its poses, a class for each kind of reading."""
+
+from pkmcal.readings.angles import Angle as Angle
+from pkmcal.readings.closure import Closure as Closure
+from pkmcal.readings.distances import Between as Between
+from pkmcal.readings.distances import Distance as Distance
+from pkmcal.readings.distances import RelativeDistance as RelativeDistance
+from pkmcal.readings.points import Height as Height
+from pkmcal.readings.points import Position as Position
+from pkmcal.readings.reading import At as At
+from pkmcal.readings.reading import Predicted as Predicted
+from pkmcal.readings.reading import Reading as Reading
+from pkmcal.readings.touches import Touch as Touch
+from pkmcal.readings.turnings import Orientation as Orientation
+from pkmcal.readings.turnings import Pose as Pose
+from pkmcal.readings.turnings import Tilt as Tilt
+from pkmcal.readings.unknowns import Dependence as Dependence
+from pkmcal.readings.unknowns import Start as Start
+from pkmcal.readings.unknowns import always as always
+from pkmcal.readings.unknowns import point as point

@@ -1,4 +1,4 @@
-"""Nothing but the actuators."""
+"""Closures: nothing is read but the actuators."""
 
 from __future__ import annotations
 
@@ -7,14 +7,25 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import FloatArray
+from pkmcal.files.csv_table import Table
+from pkmcal.readings.measured import Measured
 from pkmcal.readings.reading import At, Predicted, Reading
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Closure(Reading):
     """Nothing is read: the actuators alone, on machines with more of them than needed."""
 
-    name: str = "closure"
+    name = "closure"
 
-    def predict(self, at: At, **_: FloatArray) -> Predicted:
+    def predict(self, at: At, **numbers: FloatArray) -> Predicted:
+        """No readings (N, 0)."""
         return Predicted(np.empty((len(at.pose), 0)), np.empty((len(at.pose), 0, 6)))
+
+    def found_in(self, table: Table) -> list[str]:
+        """Nothing, for it has no columns: a table without another reading holds closures."""
+        return []
+
+    def title(self, m: Measured) -> str:
+        """How many rows."""
+        return f"{len(m)} row{'' if len(m) == 1 else 's'} of actuators alone"

@@ -3,28 +3,45 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from pkmcal.arrays import FloatArray
+from pkmcal.arrays import FloatArray, TextArray
 from pkmcal.core import instruments
+from pkmcal.exceptions import ArgumentError
+from pkmcal.files.csv_table import Table
+from pkmcal.files.csv_writer import WrittenColumn, numbered
+from pkmcal.readings import rows
+from pkmcal.readings.measured import InFit, Measured
 from pkmcal.readings.points import ORIGIN
-from pkmcal.readings.reading import At, Components, Predicted, Reading
+from pkmcal.readings.reading import At, Components, Predicted, Reading, Sets, Solve
 from pkmcal.readings.unknowns import Dependence, Found, Start, always, point
 
 DISTANCE: Components = (("distance", "mm"),)
 ZERO = np.zeros(1)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Distance(Reading):
-    """From a fixed point of the base to a point of the platform."""
+    """From a fixed point of the base, the target of the rows, to a point of the platform.
 
-    name: str = "distance"
-    components: Components = DISTANCE
-    point: Any = "base"
+    Attributes
+    ----------
+    attachment : (3,), (N, 3) or (k, 3) array, optional
+        The point in the platform frame, mm, from which distances are measured: of a wire, a ball
+        bar, a leg. One for all rows, one per row, or with `target_index` one for each target.
+        None: the platform's origin.
+    """
+
+    attachment: ArrayLike | None = None
+
+    name = "distance"
+    components = DISTANCE
+    point = "base"
+    own_points = ("attachment",)
 
     def predict(
         self,
@@ -32,65 +49,161 @@ class Distance(Reading):
         target: FloatArray = ORIGIN,
         anchor: FloatArray = ORIGIN,
         zero: FloatArray = ZERO,
-        **_: FloatArray,
+        **numbers: FloatArray,
     ) -> Predicted:
+        """Distance of `target` (N, 3) of the platform from `anchor` (N, 3) of the base, mm.
+
+        Less `zero` (N, 1), mm.
+        """
         return distances(at.pose, target, anchor, zero)
 
-    def dependences(self, data: Any) -> Iterator[Dependence]:
+    def dependences(self, data: InFit) -> Iterator[Dependence]:
+        """Both ends."""
         yield point(data.measured, "target", "attachment", data.unknown_attachment)
         yield point(data.measured, "anchor", "anchor", data.unknown_target)
 
-    def simulated(self, m: Any, truth: Any) -> dict[str, FloatArray]:
-        return {"target": m.attachments, "anchor": m.targets}
+    def arguments(self, m: Measured) -> dict[str, FloatArray]:
+        """Both ends as stated."""
+        return {"target": self._attachments(m), "anchor": m.targets}
+
+    def _attachments(self, m: Measured) -> FloatArray:
+        return m.of_points(None if self.attachment is None else np.asarray(self.attachment))
+
+    def found_in(self, table: Table) -> list[str]:
+        """A column of distances, without second places and runs."""
+        plain = "run" not in table.columns and not any(n.startswith("to.") for n in table.columns)
+        return ["distance"] if "distance" in table.columns and plain else []
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RelativeDistance(Distance):
-    """The same less the zero of its run."""
+    """A distance less the zero of its run, which is not known.
 
-    name: str = "relative-distance"
-    nouns: Any = ("relative distance", "relative distances")
+    Attributes
+    ----------
+    run : (N,) sequence of str
+        In which run each was read, by a name. A run has one zero; a simulated one starts at 0.
+    """
+
+    run: Sequence[str] | TextArray | None = None
+
+    name = "relative-distance"
+    nouns = ("relative distance", "relative distances")
     starts_by_pose = True
+    planned = False
+    labels = ("run",)
 
-    def dependences(self, data: Any) -> Iterator[Dependence]:
+    def dependences(self, data: InFit) -> Iterator[Dependence]:
+        """Both ends, and the zero of each run."""
         yield from super().dependences(data)
-        runs = data.measured.run.tolist()
-        yield always("zero", "run", (("zero", "mm"),), runs, data.starts)
+        yield always("zero", "run", (("zero", "mm"),), np.asarray(self.run).tolist(), data.starts)
 
-    def starts(self, machine: Any, sets: Sequence[tuple[Any, FloatArray]], found: Found) -> None:
+    def starts(self, machine: Any, sets: Sets, found: Found) -> None:
+        """The mean zero with which the nominal machine reads the distances of a run."""
         off: dict[str, list[FloatArray]] = {}
         for data, pose in sets:
             m = data.measured
-            here = instruments.distances(pose, m.attachments, m.targets)[0] - m.values
-            for name in np.unique(m.run).tolist():
-                off.setdefault(name, []).append(here[m.run == name])
+            run, ends = m.instrument.run, m.instrument.arguments(m)
+            here = instruments.distances(pose, ends["target"], ends["anchor"])[0] - m.values
+            for name in np.unique(run).tolist():
+                off.setdefault(name, []).append(here[run == name])
         for name, parts in off.items():
             found["run", name] = Start((0,), np.nan_to_num([_mean(np.concatenate(parts))]))
 
+    def simulated(self, m: Measured, solve: Solve) -> FloatArray:
+        """From the first row of each run on."""
+        exact = super().simulated(m, solve)
+        _, first, of_row = np.unique(np.asarray(self.run), return_index=True, return_inverse=True)
+        exact -= exact[first][of_row.reshape(-1)]
+        return exact
 
-@dataclass(frozen=True)
+    def found_in(self, table: Table) -> list[str]:
+        """A column of distances beside one of runs."""
+        there = "distance" in table.columns and "run" in table.columns
+        second = any(name.startswith("to.") for name in table.columns)
+        return ["distance"] if there and not second else []
+
+    def names(self, table: Table) -> set[str]:
+        """Distances and, beside them, runs."""
+        return {"distance"} | ({"run"} if "distance" in table.columns else set())
+
+
+@dataclass(frozen=True, eq=False)
 class Between(Reading):
-    """Between where a point of the platform is at two places."""
+    """Between where a point of the platform is at two places.
 
-    name: str = "between"
-    components: Components = DISTANCE
-    point: Any = "platform"
-    nouns: Any = ("distance between two places", "distances between two places")
+    Attributes
+    ----------
+    other : (N, n) array
+        The actuators at the second place, mm or rad.
+    """
 
-    def predict(self, at: At, target: FloatArray = ORIGIN, **_: FloatArray) -> Predicted:
+    other: ArrayLike | None = None
+
+    name = "between"
+    components = DISTANCE
+    point = "platform"
+    nouns = ("distance between two places", "distances between two places")
+    planned = False
+    per_row = ("other",)
+
+    def predict(self, at: At, target: FloatArray = ORIGIN, **numbers: FloatArray) -> Predicted:
+        """Distance of the two places of `target` (N, 3) of the platform, mm."""
         assert at.other is not None
-        return between(at.pose, at.other, target)
+        distance, *derivatives = instruments.between(at.pose, at.other, target)
+        no_direction(distance, derivatives)
+        by_twist, by_other, by_target = (by[:, None, :] for by in derivatives)
+        return Predicted(distance[:, None], by_twist, {"target": by_target}, by_other=by_other)
 
-    def dependences(self, data: Any) -> Iterator[Dependence]:
+    def dependences(self, data: InFit) -> Iterator[Dependence]:
+        """The target."""
         yield point(data.measured, "target", "target", data.unknown_target)
 
-    def simulated(self, m: Any, truth: Any) -> dict[str, FloatArray]:
-        return {"target": m.targets}
+    def simulated(self, m: Measured, solve: Solve) -> FloatArray:
+        """At the poses of both rows of actuators."""
+        there = At(solve(m.actuators, "q").pose, solve(np.asarray(self.other), "other").pose)
+        return self.predict(there, target=m.targets).values
+
+    def of_rows(
+        self, values: Any, actuators: FloatArray, targets: int | None
+    ) -> tuple[Between, ArrayLike | None]:
+        """Actuators at the second place, as many as at the first."""
+        if self.other is None:
+            raise ArgumentError(
+                "other: a distance between two places needs the actuators at the second"
+            )
+        other = rows.numbers("other", self.other)
+        other = np.atleast_2d(other) if len(actuators) == 1 else other
+        if other.shape != actuators.shape:
+            raise ArgumentError(
+                f"other must have shape {actuators.shape}, as actuators; found {other.shape}"
+            )
+        return self.with_fields({"other": other}), values
+
+    def found_in(self, table: Table) -> list[str]:
+        """A column of distances beside actuators of a second place."""
+        second = any(name.startswith("to.") for name in table.columns)
+        return ["distance"] if "distance" in table.columns and second else []
+
+    def names(self, table: Table) -> set[str]:
+        """Distances, and ``to.q1`` … for the actuators that are there."""
+        return {"distance", *(f"to.{name}" for name in table.columns if name[:1] == "q")}
+
+    def read(self, table: Table, units: Sequence[str]) -> Between:
+        """The actuators at the second place."""
+        return replace(
+            self, other=table.stacked([f"to.q{i + 1}" for i in range(len(units))], units)
+        )
+
+    def columns(self, units: Sequence[str]) -> Iterator[WrittenColumn]:
+        """The actuators at the second place."""
+        yield from numbered("to", units, np.asarray(self.other))
 
 
 def distances(
     pose: FloatArray, target: FloatArray, anchor: FloatArray, zero: FloatArray
 ) -> Predicted:
+    """Distances of points of the platform from points of the base, less a zero."""
     distance, *derivatives = instruments.distances(pose, target, anchor, zero)
     no_direction(distance + zero.reshape(-1), derivatives)
     by_twist, by_target, by_anchor = (by[:, None, :] for by in derivatives)
@@ -99,15 +212,8 @@ def distances(
     return Predicted(distance[:, None], by_twist, by)
 
 
-def between(pose: FloatArray, other: FloatArray, target: FloatArray) -> Predicted:
-    distance, *derivatives = instruments.between(pose, other, target)
-    no_direction(distance, derivatives)
-    by_twist, by_other, by_target = (by[:, None, :] for by in derivatives)
-    return Predicted(distance[:, None], by_twist, {"target": by_target}, by_other=by_other)
-
-
 def no_direction(distance: FloatArray, derivatives: list[FloatArray]) -> None:
-    """Derivatives of a distance of 0, which has no direction, are 0."""
+    """Set derivatives of a distance of 0, which has no direction, to 0."""
     for by in derivatives:
         by[distance == 0] = 0.0
 

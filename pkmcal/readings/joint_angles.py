@@ -17,9 +17,9 @@ from pkmcal.arrays import FloatArray, IntArray, wrapped
 from pkmcal.core.library import SLOTS
 from pkmcal.core.pulleys import PulleyMachine
 from pkmcal.exceptions import ArgumentError
+from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.kinematics.drive_state import DriveState
 from pkmcal.kinematics.robot import Robot
-from pkmcal.readings.calibratable import Calibratable
 
 _STEP = 1e-5  # of the machine's size
 

@@ -4,51 +4,70 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.core import instruments
+from pkmcal.files.column_names import is_turned
+from pkmcal.files.csv_table import Table
+from pkmcal.readings.measured import InFit, Measured
 from pkmcal.readings.reading import At, Predicted, Reading
 from pkmcal.readings.unknowns import POINT, Dependence, point
 
 ORIGIN = np.zeros(3)
+PLACE_TITLE = "x, y, z"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Position(Reading):
     """Where a point of the platform is."""
 
-    name: str = "position"
-    components: Any = POINT
-    framed: bool = True
-    point: Any = "platform"
+    name = "position"
+    components = POINT
+    framed = True
+    point = "platform"
 
-    def predict(self, at: At, target: FloatArray = ORIGIN, **_: FloatArray) -> Predicted:
+    def predict(self, at: At, target: FloatArray = ORIGIN, **numbers: FloatArray) -> Predicted:
+        """Place of the point `target` (N, 3) of the platform, mm."""
         return points(at.pose, target, at.frame, at.origin)
 
-    def dependences(self, data: Any) -> Iterator[Dependence]:
+    def dependences(self, data: InFit) -> Iterator[Dependence]:
+        """The target."""
         yield point(data.measured, "target", "target", data.unknown_target)
 
-    def simulated(self, m: Any, truth: Any) -> dict[str, FloatArray]:
+    def arguments(self, m: Measured) -> dict[str, FloatArray]:
+        """The targets as stated."""
         return {"target": m.targets}
 
+    def found_in(self, table: Table) -> list[str]:
+        """Columns x and y where there is no orientation."""
+        there = not table.columns.keys().isdisjoint(("x", "y"))
+        return [PLACE_TITLE] if there and not is_turned(table.columns) else []
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, eq=False)
 class Height(Position):
-    """How high it is."""
+    """How high a point of the platform is."""
 
-    name: str = "height"
-    components: Any = (("z", "mm"),)
+    name = "height"
+    components = (("z", "mm"),)
+    by_firmware = True
 
-    def predict(self, at: At, target: FloatArray = ORIGIN, **_: FloatArray) -> Predicted:
+    def predict(self, at: At, target: FloatArray = ORIGIN, **numbers: FloatArray) -> Predicted:
+        """Height of the point `target` (N, 3) of the platform, mm."""
         return some_components(points(at.pose, target, at.frame, at.origin), np.array([[2]]))
+
+    def found_in(self, table: Table) -> list[str]:
+        """Column z alone."""
+        alone = "z" in table.columns and table.columns.keys().isdisjoint(("x", "y"))
+        return [PLACE_TITLE] if alone and not is_turned(table.columns) else []
 
 
 def points(
     pose: FloatArray, target: FloatArray, frame: FloatArray | None, origin: FloatArray
 ) -> Predicted:
+    """Places of points of the platform, in the base frame or an instrument's."""
     point, by_twist, by_target = instruments.points(pose, target)
     if frame is None:
         return Predicted(point, by_twist, {"target": by_target})

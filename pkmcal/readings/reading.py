@@ -2,22 +2,44 @@
 
 What a calibration asks of a reading is here: the numbers of one value, what it predicts at a pose
 with all derivatives, which numbers beside the pose it depends on, where the search for those
-starts, and which columns of a table hold it.
+starts, what a simulated instrument reads, and which columns of a table hold it. An instrument is
+an object of the class; its fields are what is particular to it: how a sensor is mounted, what each
+row touches.
 """
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, Protocol, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from pkmcal.arrays import FloatArray, IntArray, Unit, mm_per_unit
+from pkmcal.arrays import FloatArray, IntArray, TextArray, lots, mm_per_unit
+from pkmcal.exceptions import ArgumentError
+from pkmcal.files.csv_table import Table
+from pkmcal.files.csv_writer import WrittenColumn
+from pkmcal.readings import orientation, rows
+from pkmcal.readings.measured import InFit, Measured
 from pkmcal.readings.unknowns import Dependence, Found
 
-Components = tuple[tuple[str, Unit], ...]
+Components = tuple[tuple[str, str], ...]
+Sets = Sequence[tuple[InFit, FloatArray]]  # rows of a calibration, and their nominal poses
+Own = TypeVar("Own", bound="Reading")
 NOWHERE = np.zeros(6)
+
+
+class Solve(Protocol):
+    """A simulated machine's forward kinematics."""
+
+    @property
+    def machine(self) -> Any:
+        """The machine."""
+
+    def __call__(self, actuators: FloatArray, argument: str) -> Any:
+        """Solve rows of actuators; what cannot be solved is refused as this argument's fault."""
 
 
 @dataclass(frozen=True)
@@ -27,8 +49,8 @@ class Predicted:
     Attributes
     ----------
     values : ndarray (N, k)
-        In mm and rad, as `Measurements` of the kind have them. Derivatives of the three angles of
-        orientations are those of the turning in the instrument's axes.
+        In the units of the components. Derivatives of the three angles of orientations are those
+        of the turning in the instrument's axes.
     by_twist : ndarray (N, k, 6)
         Derivative to the twist of the platform: ω, then the velocity of its origin, in base axes.
     by : mapping of str to ndarray (N, k, w)
@@ -46,6 +68,27 @@ class Predicted:
     by_other: FloatArray | None = None
 
 
+def joined(parts: Sequence[Predicted], rows_of: Sequence[IntArray]) -> Predicted:
+    """Readings of one kind whose rows stand in several parts: in which rows each part's are."""
+    if len(parts) == 1:
+        return parts[0]
+    count = sum(map(len, rows_of))
+
+    def whole(of_parts: Sequence[FloatArray]) -> FloatArray:
+        found = np.empty((count, *of_parts[0].shape[1:]))
+        for values, mine in zip(of_parts, rows_of, strict=True):
+            found[mine] = values
+        return found
+
+    numbers = {
+        name: whole([vars(part)[name] for part in parts])
+        for name, values in vars(parts[0]).items()
+        if isinstance(values, np.ndarray)
+    }
+    by = {name: whole([part.by[name] for part in parts]) for name in parts[0].by}
+    return Predicted(**numbers, by=by)
+
+
 @dataclass(frozen=True, eq=False)
 class At:
     """Where a machine is when something is read.
@@ -53,15 +96,13 @@ class At:
     Attributes
     ----------
     pose : ndarray (N, 6)
-        Of the platform in the base frame.
+        Of the platform in the base frame, mm and rad.
     other : ndarray (N, 6) or None
         At the second place.
     frame, origin : ndarray (6,)
         Pose of the base in the instrument's frame, counted from `origin`; None: they are one.
     along : ndarray of int (N,) or None
         Of touched lines and planes, which axis of its own each row's has.
-    artefact : str or None
-        What is touched.
     machines : callable or None
         Gives pairs of a machine and its rows; for what the pose alone does not determine.
     measured : Measurements or None
@@ -73,14 +114,17 @@ class At:
     frame: FloatArray | None = None
     origin: FloatArray = field(default_factory=lambda: NOWHERE)
     along: IntArray | None = None
-    artefact: str | None = None
     machines: Callable[[], Iterator[tuple[Any, IntArray]]] | None = None
-    measured: Any = None
+    measured: Measured | None = None
+
+    def of_rows(self) -> tuple[Measured, Iterator[tuple[Any, IntArray]]]:
+        """The rows and their machines, for a reading that needs both."""
+        assert self.measured is not None and self.machines is not None
+        return self.measured, self.machines()
 
 
-@dataclass(frozen=True)
 class Reading:
-    """A kind of reading.
+    """A kind of reading. A subclass is a frozen dataclass; its fields are the instrument's own.
 
     Attributes
     ----------
@@ -93,59 +137,252 @@ class Reading:
     framed : bool
         Whether the readings are in the frame of an instrument.
     point : str
-        Whose place `Measurements.target` is: of the "platform", of the "base", or "" of neither.
+        Which body `Measurements.target` is a point of: the "platform", the "base", or "", neither.
     nouns : (str, str) or None
         What one and several are called, where not as the kind and with an s.
-    by_machine : bool
-        Whether the machine's numbers change a reading at one pose.
+    by_firmware : bool
+        Whether a firmware's own numbers may be mistaken for these readings.
+    planned : bool
+        Whether poses can be planned for the object that its word stands for.
+    starts_by_pose : bool
+        Whether `starts` needs the poses of the nominal machine.
+    per_row : tuple of str
+        Fields with an entry for every row.
+    labels : tuple of str
+        Fields that name something for every row, each with a column of its own; they are needed.
+    own_points : tuple of str
+        Fields that are points, as `Measurements.target` is: (3,), (N, 3), or (k, 3) one for each of
+        several targets. Their columns are ``NAME.x``, ``.y`` and ``.z``.
+    truth : tuple of str
+        Fields that a simulation is told and nobody who measures knows.
     """
 
-    name: str = ""
-    components: Components = ()
-    turning: int | None = None
-    framed: bool = False
-    point: Literal["platform", "base", ""] = ""
-    nouns: tuple[str, str] | None = None
-    by_machine: bool = False
+    name: ClassVar[str] = ""
+    components: ClassVar[Components] = ()
+    turning: ClassVar[int | None] = None
+    framed: ClassVar[bool] = False
+    point: ClassVar[Literal["platform", "base", ""]] = ""
+    nouns: ClassVar[tuple[str, str] | None] = None
+    by_firmware: ClassVar[bool] = False
+    planned: ClassVar[bool] = True
+    starts_by_pose: ClassVar[bool] = False
+    per_row: ClassVar[tuple[str, ...]] = ()
+    labels: ClassVar[tuple[str, ...]] = ()
+    own_points: ClassVar[tuple[str, ...]] = ()
+    truth: ClassVar[tuple[str, ...]] = ()
+
+    # the model ------------------------------------------------------------------------------------
 
     def predict(self, at: At, **numbers: FloatArray) -> Predicted:
-        """What is read there, with its derivatives."""
+        """Compute the readings there, with their derivatives.
+
+        Parameters
+        ----------
+        at : At
+            Where the machine is.
+        **numbers : ndarray (w,) or (N, w)
+            The arguments that `dependences` names.
+        """
         raise NotImplementedError
 
     def by_geometry(self, at: At, places: IntArray) -> FloatArray | None:
-        """How readings follow the geometry not by the pose alone, (N, k, g)."""
+        """Derivative (N, k, g) to numbers of the geometry at a held pose; None: it is 0."""
         return None
 
-    def dependences(self, data: Any) -> Iterator[Dependence]:
-        """What the readings depend on beside pose and frame."""
+    def dependences(self, data: InFit) -> Iterator[Dependence]:
+        """State what the readings depend on beside pose and frame."""
         return iter(())
 
-    starts_by_pose = False  # whether `starts` needs the poses of the nominal machine
+    def starts(self, machine: Any, sets: Sets, found: Found) -> None:
+        """Add to `found` where the search starts for unknowns that have no present value."""
 
-    def starts(self, machine: Any, sets: Sequence[tuple[Any, FloatArray]], found: Found) -> None:
-        """Add where the search starts for what has no present value."""
-
-    def simulated(self, m: Any, truth: Mapping[str, Any]) -> dict[str, FloatArray]:
-        """The arguments of `predict` of a machine whose truth is stated."""
+    def arguments(self, m: Measured) -> dict[str, FloatArray]:
+        """Give the arguments of `predict` for an instrument whose truth is stated."""
         return {}
 
-    def mm(self, m: Any, length: float) -> FloatArray:
-        """What one unit of each component is in mm at the machine."""
-        return mm_per_unit(m.units, length)
+    def simulated(self, m: Measured, solve: Solve) -> FloatArray:
+        """Compute what the instrument would read without noise, (N, k)."""
+        at = At(solve(m.actuators, "q").pose, along=np.full(len(m), 2))
+        return self.predict(at, **self.arguments(m)).values
 
-    def arc(self, m: Any, length: float) -> float:
+    # differences ----------------------------------------------------------------------------------
+
+    def difference(self, values: FloatArray, predicted: FloatArray) -> FloatArray:
+        """Measured less predicted, (N, k); of orientations the rotation vector between them."""
+        residual: FloatArray = values.reshape(predicted.shape) - predicted
+        if (first := self.turning) is not None:
+            residual[:, first:] = orientation.between(values[:, first:], predicted[:, first:])
+        return residual
+
+    def corrected(self, predicted: FloatArray, residual: FloatArray) -> FloatArray:
+        """Values (N, k) that differ from the predicted ones by a residual: inverts `difference`."""
+        values: FloatArray = predicted + residual
+        if (first := self.turning) is not None:
+            values[:, first:] = orientation.turned(predicted[:, first:], residual[:, first:])
+        return values
+
+    def by_difference(self, derivative: FloatArray, residual: FloatArray) -> FloatArray:
+        """How `difference` shrinks, (N, k, n), in the place of a derivative of `Predicted`."""
+        if (first := self.turning) is not None:
+            for part in lots(len(residual)):
+                by_turning = orientation.by_turning(residual[part, first:])
+                derivative[part, first:] = by_turning @ derivative[part, first:]
+        return derivative
+
+    # units ----------------------------------------------------------------------------------------
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Units of the components."""
+        return tuple(unit for _, unit in self.components)
+
+    def mm(self, m: Measured, length: float) -> FloatArray:
+        """What one unit of each component is in mm at the machine, (k,) or (N, k).
+
+        Raises
+        ------
+        ValueError
+            A unit beside mm and rad, of which only the reading's own class can say this.
+        """
+        for unit in self.units:
+            if unit not in ("mm", "rad"):
+                raise ArgumentError(
+                    f"kind: the class of {self.name!r} has to state in its method mm what one"
+                    f" {unit} is in mm at the machine"
+                )
+        return mm_per_unit(self.units, length)
+
+    def arc(self, m: Measured, length: float) -> float:
         """What takes its misfit to mm: where angles alone are read, the machine's length."""
-        return 1.0 if "mm" in m.units else length
+        if "mm" in self.units:
+            return 1.0
+        return float(np.median(self.mm(m, length))) if self.units else length
+
+    def distance_per_point(self, residual: FloatArray, m: Measured, length: float) -> FloatArray:
+        """How far off each measured point is, mm (N,); of poses their position.
+
+        Where no lengths were read, what the residuals are worth at a characteristic length, mm.
+        """
+        if "mm" in self.units:
+            residual = residual[:, np.array(self.units) == "mm"]
+        elif self.units:
+            residual = residual * self.mm(m, length)
+        off: FloatArray = np.linalg.norm(residual, axis=1)
+        return off
+
+    # rows -----------------------------------------------------------------------------------------
+
+    def of_rows(
+        self: Own, values: Any, actuators: FloatArray, targets: int | None
+    ) -> tuple[Own, ArrayLike | None]:
+        """Check the fields against the rows.
+
+        Parameters
+        ----------
+        values : array_like or None
+            As the caller gave them.
+        actuators : ndarray (N, n)
+            Of the rows.
+        targets : int or None
+            How many places are stated for several targets that rows choose from.
+
+        Returns
+        -------
+        reading, values
+            With arrays, one entry a row where `per_row` says so; and the values as numbers.
+        """
+        many, found = targets or len(actuators), dict[str, Any]()
+        for name in self.labels:
+            if (given := getattr(self, name)) is None:
+                raise ArgumentError(f"{name}: {self.noun()} need one for each row, by its name")
+            found[name] = rows.names(name, given, len(actuators))
+        for name in self.own_points:
+            if (given := getattr(self, name)) is None:
+                continue
+            found[name] = rows.numbers(name, given)
+            if found[name].shape not in ((3,), (many, 3)):
+                raise ArgumentError(
+                    f"{name} must have shape (3,) or ({many}, 3); found {found[name].shape}"
+                )
+        return self.with_fields(found), values
+
+    def select(self: Own, picked: IntArray, indexed: bool) -> Own:
+        """The instrument of some rows; `indexed`: rows choose from several targets."""
+        names = [n for n in (*self.per_row, *self.labels) if getattr(self, n) is not None]
+        if not indexed:
+            names += [name for name in self.own_points if np.ndim(getattr(self, name)) == 2]
+        return self.with_fields({name: getattr(self, name)[picked] for name in names})
+
+    def measured(self: Own) -> Own:
+        """The instrument as somebody knows it who measures: without its truth."""
+        if not self.truth:
+            return self
+        defaults = {each.name: each.default for each in dataclasses.fields(self)}  # type: ignore[arg-type]
+        return self.with_fields({name: defaults[name] for name in self.truth})
+
+    def subject(self, m: Measured) -> TextArray | None:
+        """What each row is of beside its target, (N,); None: all rows are of one thing."""
+        return None
+
+    def with_fields(self: Own, changes: Mapping[str, Any]) -> Own:
+        """The instrument with other fields; arrays become read-only."""
+        if not changes:
+            return self
+        for value in changes.values():
+            if isinstance(value, np.ndarray):
+                value.setflags(write=False)
+        return dataclasses.replace(self, **changes)  # type: ignore[type-var]
+
+    # words ----------------------------------------------------------------------------------------
+
+    def noun(self, count: int = 2) -> str:
+        """What one, or several, are called."""
+        one, several = self.nouns or (self.name, f"{self.name}s")
+        return one if count == 1 else several
+
+    def title(self, m: Measured) -> str:
+        """How many of what they are."""
+        what = f"{len(m)} measured {self.noun(len(m))}"
+        missing = int(np.isnan(m.values.reshape(len(m), -1)).all(axis=1).sum())
+        return what + (f" ({missing} not read)" if missing else "")
 
     # tables ---------------------------------------------------------------------------------------
 
-    headings: ClassVar[tuple[str, ...]] = ()  # columns that are of this kind alone
-    besides: ClassVar[tuple[str, ...]] = ()  # columns that go with them
+    def found_in(self, table: Table) -> list[str]:
+        """Columns of this kind that a table has, each title for another reading; none: it has none.
 
-    def read(self, table: Any) -> dict[str, Any]:
-        """Fields of `Measurements` that its columns hold."""
-        return {}
+        By default the components under their names.
+        """
+        names = [name for name, _ in self.components]
+        return [", ".join(names)] if any(name in table.columns for name in names) else []
 
-    def cells(self, m: Any) -> Iterator[tuple[str, Sequence[str]]]:
-        """Headings and cells of these fields."""
-        return iter(())
+    def names(self, table: Table) -> set[str]:
+        """Names of all columns of a table that this kind reads."""
+        return {name for name, _ in self.components}.union(self.labels)
+
+    def read(self: Own, table: Table, units: Sequence[str]) -> Own:
+        """The instrument with the fields that columns hold; `units` are those of the actuators."""
+        return self.with_fields({name: np.array(table.texts(name)) for name in self.labels})
+
+    def columns_read(self, table: Table) -> Components:
+        """Names and units of the columns of a table that hold the values."""
+        return self.components
+
+    def value_columns(self, values: FloatArray) -> Iterator[WrittenColumn]:
+        """Columns that hold the values (N, k)."""
+        for (name, unit), column in zip(self.components, values.T, strict=True):
+            yield WrittenColumn(name, unit, column)
+
+    def columns(self, units: Sequence[str]) -> Iterator[WrittenColumn]:
+        """Columns that hold the fields with an entry for every row."""
+        for name in self.labels:
+            yield WrittenColumn(name, "", getattr(self, name))
+
+    def columns_in_file(self, units: Sequence[str]) -> Iterator[WrittenColumn]:
+        """The columns of a file that hold the fields, from which `read` has them back."""
+        return self.columns(units)
+
+    def points(self, m: Measured) -> dict[str, FloatArray]:
+        """Its own points of every row (N, 3), mm, as far as they are stated, by name."""
+        own = {name: getattr(self, name) for name in self.own_points}
+        return {name: m.of_points(place) for name, place in own.items() if place is not None}

@@ -1,5 +1,11 @@
 """Every kind of reading by its name."""
 
+from __future__ import annotations
+
+from typing import Literal, cast
+
+from pkmcal.arguments import shown, word
+from pkmcal.exceptions import ArgumentTypeError
 from pkmcal.readings.angles import Angle
 from pkmcal.readings.closure import Closure
 from pkmcal.readings.distances import Between, Distance, RelativeDistance
@@ -8,8 +14,22 @@ from pkmcal.readings.reading import Reading
 from pkmcal.readings.touches import Touch, TouchDistance
 from pkmcal.readings.turnings import Orientation, Pose, Tilt
 
+Kind = Literal[
+    "pose", "position", "height", "distance", "closure",
+    "between", "relative-distance", "orientation", "tilt", "angle", "touch", "touch-distance",
+]  # fmt: skip
+
 _EVERY: tuple[Reading, ...] = (
     Pose(), Position(), Height(), Distance(), Closure(), Between(), RelativeDistance(),
     Orientation(), Tilt(), Angle(), Touch(), TouchDistance(),
 )  # fmt: skip
-KINDS: dict[str, Reading] = {each.name: each for each in _EVERY}
+KINDS: dict[Kind, Reading] = {cast(Kind, each.name): each for each in _EVERY}
+
+
+def as_reading(given: Kind | Reading, argument: str = "kind") -> Reading:
+    """The instrument itself, or the one that a word stands for."""
+    if isinstance(given, Reading):
+        return given
+    if not isinstance(given, str):
+        raise ArgumentTypeError(f"{argument} must be a word or a Reading, found {shown(given)}")
+    return KINDS[word(argument, given, KINDS)]

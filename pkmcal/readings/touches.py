@@ -2,18 +2,32 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from pkmcal.arrays import FloatArray, IntArray, as_rows
+from pkmcal.arguments import shown, word
+from pkmcal.arrays import FloatArray, IntArray, TextArray, as_rows
 from pkmcal.core import instruments
-from pkmcal.exceptions import ArgumentError
+from pkmcal.exceptions import ArgumentError, ArgumentTypeError
+from pkmcal.files.csv_table import Table
+from pkmcal.files.csv_writer import WrittenColumn
+from pkmcal.readings import rows
 from pkmcal.readings.distances import DISTANCE, ZERO, distances, no_direction
+from pkmcal.readings.known_distances import (
+    STATED_DISTANCES,
+    TouchDistances,
+    checked_distances,
+    distances_read,
+    stated_columns,
+)
+from pkmcal.readings.measured import InFit, Measured
 from pkmcal.readings.points import ORIGIN, points, some_components
-from pkmcal.readings.reading import NOWHERE, At, Components, Predicted, Reading
+from pkmcal.readings.reading import NOWHERE, At, Components, Predicted, Reading, Sets
 from pkmcal.readings.unknowns import PLACE, POINT, Dependence, Found, Start, always, point
 
 Artefact = Literal["point", "line", "plane", "sphere"]
@@ -26,16 +40,45 @@ TOUCHES: dict[Artefact, Components] = {
     "sphere": (("off1", "mm"),),
 }
 _EVERY = (0, 1, 2)
+_COLUMN = re.compile(r"touch(?::(.+))?")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Touch(Reading):
-    """A point of the platform touches a point, a line, a plane or a sphere."""
+    """A point of the platform touches a point, a line, a plane or a sphere of unknown place.
 
-    name: str = "touch"
-    point: Any = "platform"
-    nouns: Any = ("touch", "touches")
+    A value is how far off it the point is, which is 0 where the machine touched without reading.
+
+    Attributes
+    ----------
+    touched : (N,) sequence of str
+        Name of what each row touches, the same where it touches the same.
+    artefact : {"point", "line", "plane", "sphere"}
+        What is touched; a point is a socket, a cone, a hole.
+    distances : mapping of (str, str) to float or (float, float)
+        Known distances between touched points, or centres of spheres, mm, or each with its
+        standard deviation, which is 1 µm by default: ``{("A", "B"): 50.0}``.
+    places : mapping of str to array
+        Of a simulated machine: where that is in the base frame, of a point or sphere (3,) or (4,)
+        with the radius, of a line or plane a pose (6,), whose z it is along or normal to.
+    """
+
+    touched: Sequence[str] | TextArray | None = None
+    artefact: Artefact = "point"
+    distances: Mapping[tuple[str, str], Any] | TouchDistances = ()
+    places: Mapping[str, ArrayLike] | None = None
+
+    name = "touch"
+    point = "platform"
+    nouns = ("touch", "touches")
     starts_by_pose = True
+    planned = False
+    per_row = ("touched",)
+    truth = ("places",)
+
+    def __post_init__(self) -> None:
+        word("artefact", self.artefact, TOUCHES)
+        object.__setattr__(self, "components", TOUCHES[self.artefact])
 
     def predict(
         self,
@@ -44,62 +87,166 @@ class Touch(Reading):
         anchor: FloatArray = ORIGIN,
         zero: FloatArray = ZERO,
         place: FloatArray = NOWHERE,
-        **_: FloatArray,
+        **numbers: FloatArray,
     ) -> Predicted:
-        if at.artefact == "sphere":
-            return distances(at.pose, target, anchor, zero)
-        return _touched(points(at.pose, target, None, at.origin), place, at.artefact, at.along)
+        """How far `target` (N, 3) is off the artefact, in its axes, mm.
 
-    def dependences(self, data: Any) -> Iterator[Dependence]:
-        m = data.measured
-        yield point(m, "target", "target", data.unknown_target)
-        names = m.touched.tolist()
-        if m.artefact == "sphere":
+        A sphere has its centre `anchor` (N, 3) and radius `zero` (N, 1), any other artefact a pose
+        `place` (N, 6).
+        """
+        if self.artefact == "sphere":
+            return distances(at.pose, target, anchor, zero)
+        seen = points(at.pose, target, None, at.origin)
+        return _touched(seen, place, self.artefact, at.along)
+
+    def dependences(self, data: InFit) -> Iterator[Dependence]:
+        """The target, and where the artefacts are."""
+        yield point(data.measured, "target", "target", data.unknown_target)
+        names = self._names.tolist()
+        if self.artefact == "sphere":
             yield always("anchor", "touch", POINT, names, data.starts)
             yield always("zero", "touch radius", (("radius", "mm"),), names, data.starts)
         else:
             yield always("place", "touch", PLACE, names, data.starts)
 
-    def starts(self, machine: Any, sets: Sequence[tuple[Any, FloatArray]], found: Found) -> None:
+    def starts(self, machine: Any, sets: Sets, found: Found) -> None:
+        """The artefacts nearest to the points that the nominal machine has reached."""
         _touches([(data.measured, pose) for data, pose in sets], found)
 
-    def simulated(self, m: Any, truth: Any) -> dict[str, FloatArray]:
-        wide = {"point": 3, "sphere": 4}.get(m.artefact or "", 6)
+    def arguments(self, m: Measured) -> dict[str, FloatArray]:
+        """Targets and artefacts as stated."""
+        wide = {"point": 3, "sphere": 4}.get(self.artefact, 6)
         places = {
-            name: as_rows(f"touched[{name!r}]", place, wide)[0][0]
-            for name, place in (truth["touched"] or {}).items()
+            name: as_rows(f"places[{name!r}]", place, wide)[0][0]
+            for name, place in (self.places or {}).items()
         }
-        missing = [name for name in np.unique(m.touched).tolist() if name not in places]
+        missing = [name for name in np.unique(self._names).tolist() if name not in places]
         if missing:
-            raise ArgumentError(f"touched: where {missing[0]!r} is has to be given")
-        rows = np.array([places[name] for name in m.touched.tolist()])
+            raise ArgumentError(f"places: where {missing[0]!r} is has to be given")
+        rows = np.array([places[name] for name in self._names.tolist()])
         found = {"target": m.targets}
         if wide == 4:
             return found | {"anchor": rows[:, :3], "zero": rows[:, 3:]}
         return found | {"place": np.hstack([rows, np.zeros((len(rows), 6 - wide))])}
 
+    @property
+    def _names(self) -> TextArray:
+        return np.asarray(self.touched)
 
-@dataclass(frozen=True)
+    def of_rows(
+        self, values: Any, actuators: FloatArray, targets: int | None
+    ) -> tuple[Touch, ArrayLike | None]:
+        """One name a row; the values may be these names."""
+        rows_, argument, touched = len(actuators), "touched", self.touched
+        if touched is None:
+            if isinstance(values, str) and rows_ == 1:
+                values = [values]
+            argument, touched, values = "values", _names_touched(values), None
+        named = rows.names(argument, touched, rows_)
+        if values is None:
+            wide = len(self.components)
+            values = np.zeros((rows_, wide) if wide > 1 else rows_)
+        known = checked_distances(self.distances, self.artefact)
+        return self.with_fields({"touched": named, "distances": known}), values
+
+    def title(self, m: Measured) -> str:
+        """How many touches of how many artefacts."""
+        count = len(np.unique(self._names))
+        return f"{super().title(m)} of {count} {self.artefact}{'' if count == 1 else 's'}"
+
+    def found_in(self, table: Table) -> list[str]:
+        """A column ``touch``, or ``touch:ARTEFACT``."""
+        return [name for name in table.columns if _COLUMN.fullmatch(name)]
+
+    def names(self, table: Table) -> set[str]:
+        """Touches, known distances and, where they are there, readings of how far off."""
+        off = {name for parts in TOUCHES.values() for name, _ in parts}
+        named = {"touch", *(f"touch:{name}" for name in TOUCHES), *STATED_DISTANCES}
+        return named | (off & table.columns.keys())
+
+    def read(self, table: Table, units: Sequence[str]) -> Touch:
+        """What is touched, and known distances."""
+        name = self.found_in(table)[0]
+        artefact = name.partition(":")[2] or "point"
+        if artefact not in TOUCHES:
+            raise table.header_error(
+                f"column {table.columns[name].name!r}: expected touch, touch:"
+                f"{', touch:'.join(TOUCHES)}"
+            )
+        known = distances_read(table, name)
+        return Touch(np.array(table.texts(name)), artefact, known)
+
+    def columns_read(self, table: Table) -> Components:
+        """Those of the components that are there: none where the machine touched alone."""
+        return tuple(pair for pair in self.components if pair[0] in table.columns)
+
+    def value_columns(self, values: FloatArray) -> Iterator[WrittenColumn]:
+        """The components; none where the machine touched without reading."""
+        if values.any() or np.signbit(values).any():
+            yield from super().value_columns(values)
+
+    def columns(self, units: Sequence[str]) -> Iterator[WrittenColumn]:
+        """What each row touches."""
+        of = "" if self.artefact == "point" else f":{self.artefact}"
+        yield WrittenColumn(f"touch{of}", "", self._names)
+
+    def columns_in_file(self, units: Sequence[str]) -> Iterator[WrittenColumn]:
+        """Known distances beside."""
+        yield from self.columns(units)
+        if self.distances:
+            yield from stated_columns(self._names, cast(TouchDistances, self.distances))
+
+
+@dataclass(frozen=True, eq=False)
 class TouchDistance(Reading):
-    """Between two touched points; no pose has to do with it."""
+    """A known distance between two touched points; no pose has to do with it.
 
-    name: str = "touch-distance"
-    components: Components = DISTANCE
+    `identify` makes these of `Touch.distances`.
+    """
+
+    distances: TouchDistances = ()
+
+    name = "touch-distance"
+    planned = False
+    components = DISTANCE
 
     def predict(
-        self, at: At, place: FloatArray = NOWHERE, anchor: FloatArray = ORIGIN, **_: FloatArray
+        self,
+        at: At,
+        place: FloatArray = NOWHERE,
+        anchor: FloatArray = ORIGIN,
+        **numbers: FloatArray,
     ) -> Predicted:
+        """Distance of the origin of `place` (N, 6) from `anchor` (N, 3), mm."""
         return _of_touched(place, anchor)
 
-    def dependences(self, data: Any) -> Iterator[Dependence]:
-        pairs = ((one, other) for one, other, _, _ in data.measured.touch_distances)
-        one, other = zip(*pairs, strict=True)
+    def dependences(self, data: InFit) -> Iterator[Dependence]:
+        """Both artefacts."""
+        one, other = zip(*((one, other) for one, other, _, _ in self.distances), strict=True)
         yield always("place", "touch", PLACE, one, data.starts)
         yield always("anchor", "touch", POINT, other, data.starts)
 
+    def found_in(self, table: Table) -> list[str]:
+        """Nothing, for files state known distances beside touches."""
+        return []
+
+    def names(self, table: Table) -> set[str]:
+        """None."""
+        return set()
+
+
+def _names_touched(values: Any) -> Sequence[str] | TextArray:
+    named = np.asarray(values) if isinstance(values, list | tuple | np.ndarray) else None
+    if named is None or named.ndim != 1 or named.dtype.kind != "U":
+        raise ArgumentTypeError(
+            "values of kind 'touch' must name what each row touches, one str a row; found"
+            f" {shown(values)}"
+        )
+    return named
+
 
 def _touched(
-    seen: Predicted, place: FloatArray, artefact: Artefact | None, along: IntArray | None
+    seen: Predicted, place: FloatArray, artefact: Artefact, along: IntArray | None
 ) -> Predicted:
     inside, by_place, by_point = instruments.touched_points(place, seen.values)
     by = {"target": by_point @ seen.by["target"], "place": by_place}
@@ -123,17 +270,17 @@ def _of_touched(place: FloatArray, anchor: FloatArray) -> Predicted:
     return Predicted(distance[:, None], np.zeros((len(place), 1, 6)), by)
 
 
-def _touches(sets: Sequence[tuple[Measurements, FloatArray]], found: Found) -> None:
+def _touches(sets: Sequence[tuple[Any, FloatArray]], found: Found) -> None:
     points: dict[str, list[FloatArray]] = {}
     kinds: dict[str, Artefact] = {}
     for m, pose in sets:
-        assert m.touched is not None and m.artefact is not None
+        touched, artefact = m.instrument.touched, m.instrument.artefact
         target = np.zeros(3) if m.target is None else m.targets
         here = instruments.points(pose, target)[0]
-        for name in np.unique(m.touched).tolist():
-            if kinds.setdefault(name, m.artefact) != m.artefact:
-                raise ArgumentError(f"values: {name!r} is a {kinds[name]} and a {m.artefact}")
-            points.setdefault(name, []).append(here[m.touched == name])
+        for name in np.unique(touched).tolist():
+            if kinds.setdefault(name, artefact) != artefact:
+                raise ArgumentError(f"values: {name!r} is a {kinds[name]} and a {artefact}")
+            points.setdefault(name, []).append(here[touched == name])
     for name, parts in points.items():
         reached = np.concatenate(parts)
         reached = reached[np.isfinite(reached).all(axis=1)]

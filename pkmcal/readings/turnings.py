@@ -2,95 +2,145 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pkmcal.arrays import FloatArray, as_rows
 from pkmcal.core import instruments
 from pkmcal.core.poses import compose
+from pkmcal.files.column_names import is_turned, orientation_in
+from pkmcal.files.csv_table import Table
 from pkmcal.readings import orientation
 from pkmcal.readings.alignment import angles_of, nearest_rotations, of_directions
-from pkmcal.readings.points import points
-from pkmcal.readings.reading import At, Components, Predicted, Reading
+from pkmcal.readings.measured import InFit, Measured
+from pkmcal.readings.points import PLACE_TITLE, points
+from pkmcal.readings.reading import At, Predicted, Reading, Sets
 from pkmcal.readings.unknowns import ANGLES, PLACE, Dependence, Found, Start, always
 
 _ORIGIN = np.zeros(3)
 _NOWHERE = np.zeros(6)
 _UP = np.array([0.0, 0.0, 1.0])
+_AXES = ("x", "y", "z")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Pose(Reading):
     """Where the platform is and how it is turned, or a tool on it."""
 
-    name: str = "pose"
-    components: Components = PLACE
-    turning: int | None = 3
-    framed: bool = True
+    name = "pose"
+    components = PLACE
+    turning = 3
+    framed = True
 
     def predict(
         self,
         at: At,
         tool: FloatArray | None = None,
         tool_origin: FloatArray = _NOWHERE,
-        **_: FloatArray,
+        **numbers: FloatArray,
     ) -> Predicted:
+        """Pose of the platform, or of `tool` (N, 6) on it, counted from `tool_origin` (N, 6)."""
         return _poses(at.pose, tool, tool_origin, at.frame, at.origin)
 
-    def dependences(self, data: Any) -> Iterator[Dependence]:
+    def dependences(self, data: InFit) -> Iterator[Dependence]:
+        """The tool, where it is unknown."""
         if data.unknown_target:
             yield always("tool", "tool", PLACE, [""] * len(data.measured), data.starts)
 
-    def starts(self, machine: Any, sets: Sequence[tuple[Any, FloatArray]], found: Found) -> None:
-        found["tool", ""] = Start(tuple(range(6)), np.zeros(6))  # `first_frames` lays it
+    def starts(self, machine: Any, sets: Sets, found: Found) -> None:
+        """The tool at the platform; `estimation.first_frames` aligns it together with frames."""
+        found["tool", ""] = Start(tuple(range(6)), np.zeros(6))
+
+    def found_in(self, table: Table) -> list[str]:
+        """A place and an orientation in any form."""
+        there = not table.columns.keys().isdisjoint(_AXES)
+        return [PLACE_TITLE] if there and is_turned(table.columns) else []
+
+    def names(self, table: Table) -> set[str]:
+        """A place, and the orientation in the form that is there."""
+        return {*_AXES, *orientation_in(table.columns), *(name for name, _ in ANGLES)}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Orientation(Reading):
-    """How the platform is turned, or a sensor on it."""
+    """How the platform is turned, or a sensor on it.
 
-    name: str = "orientation"
-    components: Components = ANGLES
-    turning: int | None = 0
-    framed: bool = True
+    Attributes
+    ----------
+    mounting : (3,) array
+        Of a simulated sensor: its α β γ on the platform, rad.
+    """
+
+    mounting: ArrayLike = (0.0, 0.0, 0.0)
+
+    name = "orientation"
+    components = ANGLES
+    turning: ClassVar[int | None] = 0
+    framed = True
     starts_by_pose = True
+    truth = ("mounting",)
 
-    def predict(self, at: At, mounting: FloatArray = _ORIGIN, **_: FloatArray) -> Predicted:
+    def predict(self, at: At, mounting: FloatArray = _ORIGIN, **numbers: FloatArray) -> Predicted:
+        """Orientation of the platform, or of a sensor at `mounting` (3,) or (N, 3) on it."""
         return _orientations(at.pose, mounting, at.frame, at.origin)
 
-    def dependences(self, data: Any) -> Iterator[Dependence]:
+    def dependences(self, data: InFit) -> Iterator[Dependence]:
+        """How the sensor is mounted, where that is unknown."""
         if data.unknown_target:
             yield always("mounting", "mounting", ANGLES, [""] * len(data.measured), data.starts)
 
-    def starts(self, machine: Any, sets: Sequence[tuple[Any, FloatArray]], found: Found) -> None:
+    def starts(self, machine: Any, sets: Sets, found: Found) -> None:
+        """The mounting that fits the nominal machine best."""
         _mounted(sets, found, _of_orientations)
 
-    def simulated(self, m: Any, truth: Any) -> dict[str, FloatArray]:
-        return {"mounting": as_rows("mounting", truth["mounting"], 3)[0][0]}
+    def arguments(self, m: Measured) -> dict[str, FloatArray]:
+        """The mounting as stated."""
+        return {"mounting": as_rows("mounting", self.mounting, 3)[0][0]}
+
+    def found_in(self, table: Table) -> list[str]:
+        """An orientation in any form, without a place."""
+        alone = table.columns.keys().isdisjoint(_AXES)
+        return [PLACE_TITLE] if alone and is_turned(table.columns) else []
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Tilt(Orientation):
-    """How far the x and y axes of a sensor point up."""
+    """How far the x and y axes of a sensor on the platform point up; its mounting is not known.
 
-    name: str = "tilt"
-    components: Components = (("tilt1", "rad"), ("tilt2", "rad"))
-    turning: int | None = None
+    Attributes
+    ----------
+    mounting : (3,) array
+        Of a simulated sensor: its α β γ on the platform, rad.
+    """
 
-    def predict(self, at: At, mounting: FloatArray = _ORIGIN, **_: FloatArray) -> Predicted:
+    name = "tilt"
+    components = (("tilt1", "rad"), ("tilt2", "rad"))
+    turning = None
+
+    def predict(self, at: At, mounting: FloatArray = _ORIGIN, **numbers: FloatArray) -> Predicted:
+        """Tilts of a sensor at `mounting` (3,) or (N, 3) on the platform, rad."""
         return _tilts(at.pose, mounting, at.frame, at.origin)
 
-    def dependences(self, data: Any) -> Iterator[Dependence]:
+    def dependences(self, data: InFit) -> Iterator[Dependence]:
+        """How the sensor is mounted."""
         yield always("mounting", "mounting", ANGLES, [""] * len(data.measured), data.starts)
 
-    def starts(self, machine: Any, sets: Sequence[tuple[Any, FloatArray]], found: Found) -> None:
+    def starts(self, machine: Any, sets: Sets, found: Found) -> None:
+        """The mounting that fits the nominal machine best."""
         _mounted(sets, found, _of_tilts)
 
+    def found_in(self, table: Table) -> list[str]:
+        """Columns of the tilts."""
+        return Reading.found_in(self, table)
 
-def _mounted(sets: Sequence[tuple[Any, FloatArray]], found: Found, of: Any) -> None:
+
+def _mounted(
+    sets: Sets, found: Found, of: Callable[[FloatArray, FloatArray, bool], FloatArray]
+) -> None:
     """How a sensor is mounted: by orientations if any were read, else by tilts."""
     if ("mounting", "") in found:
         return

@@ -1,8 +1,8 @@
-"""What readings depend on beside the pose: numbers that are given, or found along."""
+"""What readings depend on beside the pose: numbers that are given or estimated."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,7 +19,7 @@ _WHOLE_POINT = (0, 1, 2)
 
 @dataclass(frozen=True, eq=False)
 class Numbers:
-    """Numbers that are found along, and that some rows have in common: a point, a zero.
+    """Estimated numbers that some rows have in common: a point, a zero.
 
     Attributes
     ----------
@@ -36,7 +36,7 @@ class Numbers:
     """
 
     names: tuple[str, ...]
-    units: tuple[Unit, ...]
+    units: tuple[str, ...]
     slots: IntArray
     start: FloatArray
     scale: FloatArray | None = None
@@ -55,7 +55,7 @@ class Dependence:
     given : ndarray (N, w)
         Its numbers, as far as they are known.
     sought : mapping of str to Numbers
-        Those that are found along, by the name that rows have in common.
+        Those that are estimated, by the name that rows have in common.
     index : ndarray of int (N,)
         Which of them each row has, in their order.
     """
@@ -89,8 +89,31 @@ class Start:
 Found = dict[tuple[str, str], Start]  # by role and name
 
 
-def always(argument, role, numbers, names, starts) -> Dependence:
-    """What is never known before: `numbers` are the argument's, `names` (N,) whose they are."""
+def always(
+    argument: str,
+    role: str,
+    numbers: Sequence[tuple[str, str]],
+    names: Sequence[str],
+    starts: Mapping[tuple[str, str], Start],
+    scale: Sequence[float] | None = None,
+) -> Dependence:
+    """A dependence on numbers that are never known before.
+
+    Parameters
+    ----------
+    argument : str
+        Of `Reading.predict`.
+    role : str
+        What it is to users, as in `Dependence`.
+    numbers : sequence of (str, str)
+        Name and unit of each number of the argument.
+    names : sequence of str, N
+        Which run, artefact or sensor each row has; "" where there is but one.
+    starts : mapping of (str, str) to Start
+        Where the search for each begins, by role and name.
+    scale : sequence of float, optional
+        Of each number, as in `Numbers`; needed where its unit is none of the package's.
+    """
     sought = {}
     for name in dict.fromkeys(names):
         start = starts[role, name]
@@ -101,14 +124,15 @@ def always(argument, role, numbers, names, starts) -> Dependence:
             tuple(unit for _, unit in chosen),
             np.array(start.slots, dtype=np.intp),
             start.values,
+            None if scale is None else np.array([scale[slot] for slot in start.slots]),
         )
     order = {name: i for i, name in enumerate(sought)}
     index = np.array([order[name] for name in names], dtype=np.intp)
     return Dependence(argument, role, np.zeros((len(names), len(numbers))), sought, index)
 
 
-def point(m, argument, role, unknown) -> Dependence:
-    """A point of platform or base, which the user places."""
+def point(m: Any, argument: str, role: str, unknown: bool) -> Dependence:
+    """A dependence on a point of platform or base, which the user places."""
     if not unknown:
         given = m.attachments if role == "attachment" else m.targets
         return Dependence(argument, role, given, {}, np.zeros(len(m), dtype=np.intp))

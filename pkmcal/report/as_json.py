@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from pkmcal.arms.arm import SerialArm
+from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.kinematics.robot import Robot
-from pkmcal.readings.calibratable import as_machine
 
 VERSION = 1  # of `schema.json`: keys are added to it, never taken away or changed
 

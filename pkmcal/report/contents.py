@@ -16,11 +16,11 @@ from pkmcal.display import printable
 from pkmcal.estimation import misfits
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.fit_data import FitData
+from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.kinematics.robot import Robot
 from pkmcal.kinematics.workspace import reach, sample_poses, workspace
 from pkmcal.measurements.iso9283 import performance
 from pkmcal.measurements.repeats import groups
-from pkmcal.readings.calibratable import as_machine
 
 _WORST = 10  # rows that are listed
 _ALIKE = 1e-6  # mm by which distances differ that are not equal

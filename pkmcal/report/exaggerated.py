@@ -7,7 +7,7 @@ import numpy as np
 from pkmcal.arrays import FloatArray
 from pkmcal.calibration.identification import Identification
 from pkmcal.estimation.parameters import Parameters
-from pkmcal.readings.calibratable import as_given
+from pkmcal.kinematics.calibratable import as_given
 from pkmcal.view.skeleton import Skeleton, skeleton
 
 _SEEN = 0.06  # of the machine's size: how far the most displaced joint is drawn off

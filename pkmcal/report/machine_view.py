@@ -13,8 +13,8 @@ from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray
 from pkmcal.calibration.identification import Identification
 from pkmcal.fitted.row_names import row_names
+from pkmcal.kinematics.calibratable import as_given
 from pkmcal.kinematics.robot import Robot
-from pkmcal.readings.calibratable import as_given
 from pkmcal.report.drawing import sample
 from pkmcal.report.exaggerated import middle_exaggerated
 from pkmcal.report.residual_vectors import measured_places, residual_vectors

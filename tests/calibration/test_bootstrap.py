@@ -103,7 +103,7 @@ def test_mixed_measurements_robust_loss_and_covariances(hexapod: Robot) -> None:
     sets = [
         pk.VirtualMachine(hexapod, tracker, seed=4).measure(q),
         pk.VirtualMachine(hexapod, 0.05, seed=5).measure(
-            q, "distance", anchor, attachment=[50, 0, 20]
+            q, pk.readings.Distance([50, 0, 20]), anchor
         ),
         pk.VirtualMachine(hexapod, 0.02, seed=6).measure(q, "pose"),
     ]

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 import pkmcal as pk
 from pkmcal.estimation.identifiability import decompose
-from pkmcal.readings.calibratable import as_machine
+from pkmcal.kinematics.calibratable import as_machine
 
 from .. import workspaces
 

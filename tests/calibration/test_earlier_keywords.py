@@ -64,7 +64,7 @@ def test_a_wrong_word_is_refused_as_before(
 
 
 @pytest.mark.parametrize(("arguments", "says"), [
-    ({"drop": "outlier"}, "drop: 'outliers', 'slack' or numbers of rows, found 'outlier'; did you mean"),
+    ({"drop": "outlier"}, "drop: 'outliers', 'slack' or numbers of rows, found 'outlier'; did"),
     ({"drop": [1.5]}, "drop: rows are whole numbers"),
     ({"unknown": "anchor"}, "unknown must be one of frame, target, attachment"),
     ({"effects": 11.5e-6}, "effects: expected such as"),

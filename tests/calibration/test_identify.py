@@ -12,10 +12,10 @@ from pkmcal.calibration.identify import identify
 from pkmcal.core import instruments
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.measurements.observation import predict
 from pkmcal.measurements.virtual_machine import VirtualMachine
 
 from .. import workspaces
+from ..measurements.kinds import predict
 from ..simulated import hexapod_poses, missed, tilted_poses, with_errors
 
 

@@ -18,9 +18,10 @@ from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.free_parameters import parameters
 from pkmcal.estimation.parameters import Asked
+from pkmcal.kinematics.calibratable import ArmMachine
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.virtual_machine import VirtualMachine
-from pkmcal.readings.calibratable import ArmMachine
+from pkmcal.readings import Distance
 
 ARM = pk.SerialArm.from_dh(  # an industrial arm with a wrist in one point
     a=[312, 1075, 225, 0, 0, 0],
@@ -221,9 +222,9 @@ def test_derivatives_of_what_is_read_are_those_of_differences(kind: str, framed:
         assert abs(pk.screw.to_pose(ARM.forward(theta[0]))[4]) == pytest.approx(np.pi / 2, abs=1e-9)
     shape = {"height": (7,), "distance": (7,), "position": (7, 3), "pose": (7, 6)}[kind]
     measured = Measurements(
-        theta, rng.normal(size=shape), kind,
+        theta, rng.normal(size=shape),
+        Distance([50.0, 60.0, 70.0]) if kind == "distance" else kind,
         target=None if kind == "pose" else [300.0, -200.0, 150.0],
-        attachment=[50.0, 60.0, 70.0] if kind == "distance" else None,
     )  # fmt: skip
     share = FitData(measured, np.arange(7), framed, False)
     equations = Equations.of([share], parameters(ArmMachine(erring(ARM)), [share], Asked()))

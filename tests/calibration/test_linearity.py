@@ -11,7 +11,7 @@ import pytest
 import pkmcal as pk
 from pkmcal.arrays import FloatArray
 from pkmcal.diagnostics.linearity import Weak, beyond_linear
-from pkmcal.readings.calibratable import as_machine
+from pkmcal.kinematics.calibratable import as_machine
 
 ROWS = 12
 

@@ -73,7 +73,7 @@ def fitted(machine: pk.Robot, log: Drawn) -> pk.Identification:
     """Lengths in every row, and the swivels of two pulleys with unknown zeros."""
     sets = [
         pk.Measurements(
-            log.lengths, log.swivels[:, k], "angle", joint=f"swivel{limb + 1}", sigma=TURNED,
+            log.lengths, log.swivels[:, k], pk.readings.Angle(f"swivel{limb + 1}"), sigma=TURNED,
             actuator_sigma=NOISE,
         )
         for k, limb in enumerate(READ)
@@ -143,5 +143,5 @@ def test_other_angles_are_still_refused(machine: pk.Robot) -> None:
     log = drawn(8, 5)
     with pytest.raises(pk.ArgumentError, match="no passive joint 'swivel9'"):
         pk.identify(
-            machine, pk.Measurements(log.lengths, log.swivels[:, 0], "angle", joint="swivel9")
+            machine, pk.Measurements(log.lengths, log.swivels[:, 0], pk.readings.Angle("swivel9"))
         )

@@ -54,7 +54,7 @@ def between(true: Robot, rng: np.random.Generator, machine: pk.VirtualMachine) -
     def read(robot: Robot, _: Numbers) -> FloatArray:
         return np.linalg.norm(tips(robot, other) - tips(robot, q), axis=1) / NOISE
 
-    return Case(machine.measure(q, "between", TIP, other=other), read)
+    return Case(machine.measure(q, pk.readings.Between(other), TIP), read)
 
 
 def relative(true: Robot, rng: np.random.Generator, machine: pk.VirtualMachine) -> Case:
@@ -72,7 +72,7 @@ def relative(true: Robot, rng: np.random.Generator, machine: pk.VirtualMachine) 
     zeros = distances(true)[[0, 30, 60]]
     truth = dict(zip(("run.A.zero", "run.B.zero", "run.C.zero"), zeros.tolist(), strict=True))
     names = ["ABC"[i] for i in run]
-    measured = machine.measure(q, "relative-distance", stands, attachment=TIP, run=names)
+    measured = machine.measure(q, pk.readings.RelativeDistance(TIP, names), stands)
     return Case(measured, read, truth)
 
 
@@ -91,7 +91,7 @@ def orientation(true: Robot, rng: np.random.Generator, machine: pk.VirtualMachin
     def read(robot: Robot, at: Numbers) -> FloatArray:
         return (sensor(robot, q, at) * about).as_rotvec().ravel() * ARM / NOISE
 
-    measured = machine.measure(q, "orientation", mounting=list(MOUNTING.values()))
+    measured = machine.measure(q, pk.readings.Orientation(list(MOUNTING.values())))
     return Case(measured, read, MOUNTING, target="unknown")
 
 
@@ -102,7 +102,7 @@ def tilt(true: Robot, rng: np.random.Generator, machine: pk.VirtualMachine) -> C
         axes = sensor(robot, q, at).as_matrix()
         return np.arcsin(axes[:, 2, :2]).ravel() * ARM / NOISE
 
-    return Case(machine.measure(q, "tilt", mounting=list(MOUNTING.values())), read, MOUNTING)
+    return Case(machine.measure(q, pk.readings.Tilt(list(MOUNTING.values()))), read, MOUNTING)
 
 
 def angle(true: Robot, rng: np.random.Generator, machine: pk.VirtualMachine) -> Case:
@@ -113,7 +113,7 @@ def angle(true: Robot, rng: np.random.Generator, machine: pk.VirtualMachine) -> 
         angles = robot.forward(q).passive[:, place] - at["angle.limb1.joint2.zero"]
         return angles * ARM / NOISE
 
-    measured = machine.measure(q, "angle", joint="limb1.joint2")
+    measured = machine.measure(q, pk.readings.Angle("limb1.joint2"))
     return Case(measured, read, {"angle.limb1.joint2.zero": 0.0})
 
 
@@ -199,9 +199,8 @@ def touches(artefact: str, true: Robot, rng: np.random.Generator) -> Case:
         rows = [read_off(artefact, at, name, x[names == name]) / NOISE for name in each]
         return np.concatenate([*rows, [gap(at) / 0.001]] if known else rows)
 
-    measured = Measurements(
-        q, names, "touch", artefact=artefact, sigma=NOISE, target=TIP, touch_distances=known
-    )
+    touch = pk.readings.Touch(names, artefact, known)
+    measured = Measurements(q, None, touch, sigma=NOISE, target=TIP)
     return Case(measured, read, truth)
 
 

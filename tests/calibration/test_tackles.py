@@ -110,7 +110,7 @@ def test_zeros_of_swivels_turn_with_the_frame() -> None:
     q, turned = robot.inverse(at), robot.forward(robot.inverse(at)).passive
     sets = [
         pk.Measurements(
-            q, turned[:, k], "angle", joint=f"swivel{k + 1}", sigma=1e-3, actuator_sigma=0.3
+            q, turned[:, k], pk.readings.Angle(f"swivel{k + 1}"), sigma=1e-3, actuator_sigma=0.3
         )
         for k in range(4)
     ]

@@ -9,8 +9,8 @@ import pytest
 
 import pkmcal as pk
 from pkmcal.calibration.identification import Identification
+from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.readings.calibratable import as_machine
 
 from ..simulated import hexapod_poses
 
@@ -36,8 +36,8 @@ def found_from(
         else:
             anchor = np.array([900.0, 100, 50])
             seen = np.linalg.norm(place - anchor, axis=1) + rng.normal(0, NOISE, 24)
-            sets.append(Measurements(q, seen, "distance", target=anchor, attachment=[0, 0, 0],
-                                     sigma=sigma))  # fmt: skip
+            wire = pk.readings.Distance([0, 0, 0])
+            sets.append(Measurements(q, seen, wire, target=anchor, sigma=sigma))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)
         found = pk.identify(robot, sets, "offset*")

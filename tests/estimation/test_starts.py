@@ -15,7 +15,8 @@ ABOUT = np.array([[1.0, 0, 0], [0, 1, 0], [0.6, 0, 0.8], [0, -0.8, 0.6], [-0.6, 
 
 def starts(robot: pk.Robot, points: np.ndarray, artefact: str) -> dict[str, np.ndarray]:
     poses = np.hstack([points, np.zeros((len(points), 3))])
-    touched = pk.Measurements(robot.inverse(poses), ["A"] * len(points), "touch", artefact=artefact)
+    touch = pk.readings.Touch(["A"] * len(points), artefact)
+    touched = pk.Measurements(robot.inverse(poses), None, touch)
     (data,) = with_starts(robot, [FitData(touched, np.arange(len(points)), False, False)])
     return {role: start.values for (role, _), start in data.starts.items()}
 

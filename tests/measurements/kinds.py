@@ -6,15 +6,18 @@ from typing import Any
 
 import numpy as np
 
-from pkmcal.measurements.components import KINDS, TOUCHES, components
+from pkmcal.readings import Angle, At, Between, Predicted, RelativeDistance, Touch
+from pkmcal.readings.registry import KINDS
+from pkmcal.readings.touches import TOUCHES
 
 PUBLIC = tuple(kind for kind in KINDS if kind != "touch-distance")  # which `identify` makes
 OF_ORIENTATIONS = ("pose", "orientation")
+ARTEFACTS = tuple(TOUCHES)
 
 
 def width(kind: str, artefact: str | None = None) -> int:
     """Numbers of one value."""
-    return len(components(kind, artefact or ("point" if kind == "touch" else None)))
+    return len(TOUCHES[artefact] if artefact else KINDS[kind].components)
 
 
 def shape(kind: str, rows: int, artefact: str | None = None) -> tuple[int, ...]:
@@ -24,15 +27,15 @@ def shape(kind: str, rows: int, artefact: str | None = None) -> tuple[int, ...]:
 
 
 def needed(kind: str, rows: int, actuators: int, artefact: str = "point") -> dict[str, Any]:
-    """The fields that a kind cannot do without."""
+    """The arguments of `Measurements` that a kind cannot do without."""
     names = [f"no {1 + i % 2}" for i in range(rows)]
     second = np.random.default_rng(9).uniform(300, 500, (rows, actuators))
     return {
         "distance": {"target": [0, 0, 100]},
-        "between": {"other": second},
-        "relative-distance": {"target": [0, 0, 100], "run": names},
-        "angle": {"joint": "limb1.joint2"},
-        "touch": {"touched": names, "artefact": artefact},
+        "between": {"instrument": Between(second)},
+        "relative-distance": {"target": [0, 0, 100], "instrument": RelativeDistance(run=names)},
+        "angle": {"instrument": Angle("limb1.joint2")},
+        "touch": {"instrument": Touch(names, artefact)},
     }.get(kind, {})
 
 
@@ -41,4 +44,14 @@ def takes_target(kind: str) -> bool:
     return bool(KINDS[kind].point)
 
 
-ARTEFACTS = tuple(TOUCHES)
+def predict(
+    kind: str,
+    pose: np.ndarray,
+    target: np.ndarray | None = None,
+    frame: np.ndarray | None = None,
+    **numbers: np.ndarray,
+) -> Predicted:
+    """Readings of a kind at poses."""
+    if target is not None:
+        numbers["target"] = target
+    return KINDS[kind].predict(At(pose, frame=frame), **numbers)

@@ -10,6 +10,7 @@ import pytest
 from pkmcal.calibration.identify import identify
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.virtual_machine import VirtualMachine
+from pkmcal.readings import Distance
 
 from ..simulated import hexapod_poses
 
@@ -34,13 +35,11 @@ def test_wires_are_found_at_both_ends(hexapod: Robot) -> None:
     index = np.tile(np.arange(6), 60)
     anchors, ends = rng.uniform(-500, 500, (6, 3)), rng.uniform(-120, 120, (6, 3))
     anchors[:, 2] -= 400.0
-    exact = VirtualMachine(true, noise=0).measure(
-        q, "distance", anchors[index], attachment=ends[index]
-    )
+    exact = VirtualMachine(true, noise=0).measure(q, Distance(ends[index]), anchors[index])
     rough = dataclasses.replace(
         exact,
         target=anchors + rng.normal(0, 3, (6, 3)),
-        attachment=ends + rng.normal(0, 3, (6, 3)),
+        instrument=Distance(ends + rng.normal(0, 3, (6, 3))),
         target_index=index,
     )
     found = identify(hexapod, rough, free="offset*", unknown=["target", "attachment"])
@@ -48,7 +47,9 @@ def test_wires_are_found_at_both_ends(hexapod: Robot) -> None:
     assert found.free[24:27] == ("anchor1.x", "anchor1.y", "anchor1.z")
     truth = np.concatenate([[0, 0.5, 0, 0, -0.3, 0], ends.ravel(), anchors.ravel()])
     np.testing.assert_allclose(found.values, truth, atol=1e-6)
-    known = dataclasses.replace(exact, target=anchors, attachment=ends, target_index=index)
+    known = dataclasses.replace(
+        exact, target=anchors, instrument=Distance(ends), target_index=index
+    )
     np.testing.assert_allclose(
         identify(hexapod, known, free="offset*").values, truth[:6], atol=1e-9
     )
@@ -58,8 +59,8 @@ def test_wires_may_be_held_out_with_both_ends_unknown(hexapod: Robot) -> None:
     rng = np.random.default_rng(20)
     q = hexapod.inverse(hexapod_poses(hexapod, 60, rng))
     anchor, end = np.array([400.0, 300.0, -100.0]), np.array([60.0, -40.0, 20.0])
-    measured = VirtualMachine(hexapod, noise=0.02).measure(q, "distance", anchor, attachment=end)
-    rough = dataclasses.replace(measured, target=anchor + 3.0, attachment=end - 2.0)
+    measured = VirtualMachine(hexapod, noise=0.02).measure(q, Distance(end), anchor)
+    rough = dataclasses.replace(measured, target=anchor + 3.0, instrument=Distance(end - 2.0))
     words = {"unknown": ["target", "attachment"]}
     found = identify(hexapod, rough, free="offset2", prior=0.5, holdout=0.25, **words)
     assert found.free[1:] == tuple(
@@ -72,8 +73,8 @@ def test_one_end_may_be_known_and_the_other_not(hexapod: Robot) -> None:
     rng = np.random.default_rng(19)
     q = hexapod.inverse(hexapod_poses(hexapod, 40, rng))
     anchor, end = np.array([400.0, 300.0, -100.0]), np.array([60.0, -40.0, 20.0])
-    exact = VirtualMachine(hexapod, noise=0).measure(q, "distance", anchor, attachment=end)
-    rough = dataclasses.replace(exact, attachment=end + np.array([3, -4, 5]))
+    exact = VirtualMachine(hexapod, noise=0).measure(q, Distance(end), anchor)
+    rough = dataclasses.replace(exact, instrument=Distance(end + np.array([3, -4, 5])))
     found = identify(hexapod, rough, free="offset2", unknown="attachment")
     assert found.free == ("offset2", "attachment1.x", "attachment1.y", "attachment1.z")
     np.testing.assert_allclose(found.values, [0.0, *end], atol=1e-6)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -16,6 +17,7 @@ from hypothesis.extra.numpy import arrays
 from pkmcal.files import atomic as whole_file
 from pkmcal.measurements.measurement_csv import read_measurements
 from pkmcal.measurements.measurements import Measurements
+from pkmcal.readings import Distance
 
 from .kinds import ARTEFACTS, OF_ORIENTATIONS, PUBLIC, needed, takes_target, width
 
@@ -178,7 +180,8 @@ def measurements(draw: st.DrawFn) -> Measurements:
     rows, n, k = draw(st.integers(1, 4)), draw(st.integers(1, 3)), width(kind, artefact)
     fields: dict[str, Any] = needed(kind, rows, n, artefact or "point")
     if artefact in ("point", "sphere") and rows > 1 and draw(st.booleans()):
-        fields["touch_distances"] = {("no 1", "no 2"): draw(POSITIVE), ("no 2", "a third"): 5.0}
+        known = {("no 1", "no 2"): draw(POSITIVE), ("no 2", "a third"): 5.0}
+        fields["instrument"] = replace(fields["instrument"], distances=known)
     if k and draw(st.booleans()):
         shape = draw(st.sampled_from([(), (rows, 1), (rows, k)]))
         fields["sigma"] = draw(arrays(float, shape, elements=POSITIVE))
@@ -193,7 +196,8 @@ def measurements(draw: st.DrawFn) -> Measurements:
         fields["target"] = draw(arrays(float, shape, elements=NUMBERS))
     if of_base and draw(st.booleans()):
         shape = draw(st.sampled_from([(3,), (rows, 3)]))
-        fields["attachment"] = draw(arrays(float, shape, elements=NUMBERS))
+        own = fields.get("instrument", Distance())
+        fields["instrument"] = replace(own, attachment=draw(arrays(float, shape, elements=NUMBERS)))
     values = draw(arrays(float, (rows, k) if k != 1 else (rows,), elements=NUMBERS))
     if kind not in OF_ORIENTATIONS and draw(st.booleans()):
         values[0] = np.nan  # not read

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.virtual_machine import VirtualMachine
+from pkmcal.readings import Distance
 
 from .kinds import PUBLIC, needed, width
 
@@ -77,7 +78,8 @@ def test_one_row_is_taken_as_it_is(kind: str) -> None:
         of_rows = needed(kind, 5, 4)
         if kind in ("between", "relative-distance", "touch"):
             name = {"between": "other", "relative-distance": "run"}.get(kind, "touched")
-            of_rows |= {name: of_rows[name][row]}
+            own = of_rows["instrument"]
+            of_rows["instrument"] = dataclasses.replace(own, **{name: getattr(own, name)[row]})
         fields |= of_rows
         one = Measurements(
             several.actuators[row], value, kind, group=several.group[row], lines=7, **fields
@@ -121,13 +123,13 @@ def test_the_target_of_every_row() -> None:
 def test_the_attachment_of_every_row() -> None:
     np.testing.assert_array_equal(make("distance").attachments, np.zeros((5, 3)))
     per_row = np.arange(15.0).reshape(5, 3)
-    wires = make("distance", attachment=per_row)
+    wires = make("distance", instrument=Distance(per_row))
     np.testing.assert_array_equal(wires.attachments, per_row)
     np.testing.assert_array_equal(wires.select([4, 1]).attachments, per_row[[4, 1]])
     several: dict[str, Any] = {"target": np.eye(3)[:2], "target_index": [0, 1, 1, 0, 1]}
-    each = make("distance", attachment=[[7, 0, 0], [8, 0, 0]], **several)
+    each = make("distance", instrument=Distance([[7, 0, 0], [8, 0, 0]]), **several)
     np.testing.assert_array_equal(each.attachments[:, 0], [7, 8, 8, 7, 8])
-    one = make("distance", attachment=[7, 8, 9], **several)
+    one = make("distance", instrument=Distance([7, 8, 9]), **several)
     np.testing.assert_array_equal(one.attachments, [[7, 8, 9]] * 5)
 
 
@@ -182,9 +184,9 @@ BAD: list[tuple[dict[str, Any], type[Exception], str]] = [
     ({"target_index": [0, 1], "target_names": ["A", "A"]}, ValueError, "different names"),
     ({"target_index": [0, 1], "target_names": ["A" * 201, "B"]}, ValueError, "at most 200"),
     ({"target_index": [0, 1], "target_names": ["A"]}, ValueError, "must name 2 targets; found 1"),
-    ({"attachment": [0, 0, 1]}, ValueError, "attachment: distances alone have one.*'position'"),
+    ({"attachment": [0, 0, 1]}, ValueError, "attachment: goes with .*'distance'.*'position'"),
     (
-        {"kind": "distance", "values": [1, 2], "target": [0, 0, 0], "attachment": [1, 2]},
+        {"kind": "distance", "values": [1, 2], "target": [0, 0, 0], "instrument": Distance([1, 2])},
         ValueError,
         r"attachment must have shape \(3,\) or \(2, 3\); found \(2,\)",
     ),
@@ -321,7 +323,7 @@ def test_without_noise_a_virtual_machine_reads_what_is_there(
 
 
 def test_distances_run_from_the_target_to_the_attachment() -> None:
-    m = VirtualMachine(Gantry(), noise=0).measure(Q, "distance", [0, 0, 10], attachment=[2, 0, 0])
+    m = VirtualMachine(Gantry(), noise=0).measure(Q, Distance([2, 0, 0]), [0, 0, 10])
     np.testing.assert_allclose(m.values, [np.sqrt(9 + 36 + 100), 2], atol=1e-14)
     np.testing.assert_array_equal(m.attachment, [2, 0, 0])
 

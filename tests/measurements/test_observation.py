@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -14,13 +16,13 @@ from pkmcal.estimation.parameters import Asked
 from pkmcal.estimation.starts import with_starts
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.measurements.observation import difference, predict
+from pkmcal.readings import Between, Distance
 
 from .. import twin
 from ..simulated import hexapod_poses
-from .kinds import ARTEFACTS, needed, shape
+from .kinds import ARTEFACTS, KINDS, needed, predict, shape
 
-KINDS = (
+EVERY = (
     *("pose", "position", "height", "distance", "between", "relative-distance", "orientation"),
     *("tilt", *(f"touch {artefact}" for artefact in ARTEFACTS)),
 )
@@ -42,9 +44,10 @@ def measured(robot: Robot, kind: str, rng: np.random.Generator) -> Measurements:
     two = np.array([[60.0, -20.0, 35.0], [300.0, 200.0, -50.0]])
     fields |= {"target": two, "target_index": np.arange(12) % 2}
     if "distance" in kind:
-        fields["attachment"] = two[:, ::-1]
+        own = fields.get("instrument", Distance())
+        fields["instrument"] = replace(own, attachment=two[:, ::-1])
     if kind == "between":
-        fields["other"] = robot.inverse(hexapod_poses(robot, 12, rng))
+        fields["instrument"] = Between(robot.inverse(hexapod_poses(robot, 12, rng)))
     return Measurements(q, rng.normal(0, 3, shape(kind, 12, artefact or None)), kind, **fields)
 
 
@@ -59,7 +62,7 @@ def differences(equations: Equations, theta: np.ndarray, scale: np.ndarray) -> n
 
 
 @pytest.mark.parametrize("unknown", [False, True], ids=["known", "unknown frame and target"])
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", EVERY)
 def test_analytic_jacobian_equals_differences(kind: str, unknown: bool) -> None:
     rng = np.random.default_rng(7)
     robot = pk.load("hexapod")
@@ -132,7 +135,7 @@ def test_poses_in_a_frame_carry_points_there() -> None:
 def test_angles_differ_the_short_way_round() -> None:
     one = np.array([[0, 0, 0, np.pi - 0.01, 0, 0]])
     other = np.array([[0, 0, 0, -np.pi + 0.01, 0, 0]])
-    np.testing.assert_allclose(difference("pose", one, other)[0, 3], -0.02, atol=1e-12)
+    np.testing.assert_allclose(KINDS["pose"].difference(one, other)[0, 3], -0.02, atol=1e-12)
 
 
 def test_a_distance_between_touched_points_is_theirs_whatever_the_machine_does() -> None:

@@ -13,8 +13,8 @@ from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.free_parameters import parameters
 from pkmcal.estimation.parameters import Asked
-from pkmcal.measurements.observation import corrected, difference
 from pkmcal.readings import orientation
+from pkmcal.readings.registry import KINDS
 
 from ..workspaces import WORKSPACE, poses
 
@@ -51,7 +51,7 @@ def test_a_difference_is_undone_by_correcting() -> None:
     rng = np.random.default_rng(2)
     values = rng.uniform(-3, 3, (30, 6))
     residual = rng.normal(0, 0.5, (30, 6))
-    again = difference("pose", corrected("pose", values, residual), values)
+    again = KINDS["pose"].difference(KINDS["pose"].corrected(values, residual), values)
     np.testing.assert_allclose(again, residual, atol=1e-9)
 
 
@@ -104,18 +104,18 @@ def test_a_covariance_that_knows_a_turning_exactly_is_refused() -> None:
 def test_derivatives_of_residuals_are_their_differences(name: str, framed: bool) -> None:
     robot, rng = pk.load(name), np.random.default_rng(5)
     at = poses(name, 6, 5)
-    values = corrected("pose", robot.complete(at), rng.normal(0, 0.4, (6, 6)))
+    values = KINDS["pose"].corrected(robot.complete(at), rng.normal(0, 0.4, (6, 6)))
     data = FitData(pk.Measurements(robot.inverse(at), values, "pose"), np.arange(6), framed, False)
     chosen = parameters(robot, [data], Asked("offset*"))
     equations = Equations.of([data], chosen)
-    equations.start_from(np.arange(len(at)), at)
     theta = chosen.start.copy()
     if framed:
         theta[chosen.frame : chosen.frame + 6] = [40, -20, 9, 0.4, np.pi / 2, 2.0]
-    (jacobian,) = equations.jacobian(equations.at(theta))
+    near = equations.guess.at_poses(np.arange(len(at)), at)
+    (jacobian,) = equations.jacobian(equations.at(theta, near=near))
     for j, scale in enumerate(chosen.scale):
         step = np.eye(len(theta))[j] * 1e-4 * scale
-        ends = [equations.at(theta + s * step).residuals[0] for s in (1, -1)]
+        ends = [equations.at(theta + s * step, near=near).residuals[0] for s in (1, -1)]
         expected = (ends[1] - ends[0]) / 2e-4
         np.testing.assert_allclose(jacobian[:, :, j] * scale, expected, rtol=1e-5, atol=1e-6)
 
@@ -145,7 +145,7 @@ def test_a_turned_tool_does_not_change_a_calibration(beta: float) -> None:
     q, n = plain.inverse(at), len(plain.model.limbs)
     true = plain.replace({f"offset{i + 1}": 0.3 * rng.normal() for i in range(n)})
     noise = SIGMA * rng.normal(size=(40, 6))
-    seen = corrected("pose", true.forward(q).pose, noise)
+    seen = KINDS["pose"].corrected(true.forward(q).pose, noise)
     tool = of(np.array([0.2, beta, -0.4]))
     values = seen.copy()
     turned_axes = orientation.rotations(seen[:, 3:]) @ tool.as_matrix()

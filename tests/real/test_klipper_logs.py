@@ -84,7 +84,7 @@ def printed(log: dict[str, Any], sigma: float | None) -> Measurements:
     """Distances between two points of a print, which were measured with a caliper."""
     distances, first, then = zip(*log["distance"], strict=True)
     first, then = (-np.array(pos) * np.array(log["stepdist"]) for pos in (first, then))
-    return Measurements(first, distances, "between", other=then, sigma=sigma)
+    return Measurements(first, distances, pk.readings.Between(then), sigma=sigma)
 
 
 def with_distances() -> list[dict[str, Any]]:

@@ -44,7 +44,7 @@ def touches(rows: dict[str, FloatArray], sockets: str, apart: str) -> Measuremen
     names = np.repeat(list(sockets), [len(rows[name]) for name in sockets])
     q = np.concatenate([rows[name] for name in sockets])
     known = {(apart[0], apart[1]): APART} if apart else {}
-    return Measurements(q, names, "touch", target=TIP, touch_distances=known)
+    return Measurements(q, None, pk.readings.Touch(names, distances=known), target=TIP)
 
 
 def tips(found: pk.Identification, q: FloatArray) -> FloatArray:

@@ -44,7 +44,7 @@ ANCHOR = np.array([900.0, -200.0, 100.0])
 def found_from(kind: Any) -> Identification:
     machine = pk.VirtualMachine(TRUE, noise=0.01, seed=1)
     if kind == "distance":
-        measured = machine.measure(Q, kind, ANCHOR, attachment=TARGET)
+        measured = machine.measure(Q, pk.readings.Distance(TARGET), ANCHOR)
     else:
         measured = machine.measure(Q, kind, TARGET)
     return pk.identify(HEXAPOD, measured, free="offset*")

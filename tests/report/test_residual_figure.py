@@ -12,7 +12,7 @@ from matplotlib.quiver import Quiver
 
 import pkmcal as pk
 from pkmcal.calibration.identification import Identification
-from pkmcal.measurements.components import TOUCHES, Artefact
+from pkmcal.readings.touches import TOUCHES, Artefact
 from pkmcal.report.drawing import MOST_DRAWN, sample
 from pkmcal.report.residual_figure import _look, residuals
 

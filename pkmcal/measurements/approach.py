@@ -1,0 +1,53 @@
+"""From where each actuator came to its reading, for drives with backlash."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray
+from pkmcal.exceptions import ArgumentError
+from pkmcal.files.csv_table import Table
+from pkmcal.files.csv_writer import WrittenColumn, numbered
+from pkmcal.measurements.actuator_columns import read_of_actuators
+from pkmcal.measurements.field import Field, of_actuators
+from pkmcal.readings.reading import Reading
+
+
+class Approach(Field):
+    """1 where a reading had grown, -1 where it had fallen, 0 where that is not known."""
+
+    logged = True
+
+    def kept(self, given: Any, m: Any) -> FloatArray:
+        """Signs (N, n); "order": by the order of the rows."""
+        if isinstance(given, str):
+            if given != "order":
+                raise ArgumentError(f"approach must be 'order' or numbers; found {given!r}")
+            moved = np.sign(np.diff(m.actuators, axis=0, prepend=m.actuators[:1]))
+            for row, before in zip(moved[1:], moved[:-1], strict=True):
+                row[row == 0.0] = before[row == 0.0]  # it stood still since
+            return np.asarray(moved)
+        found = of_actuators("approach", given, m.actuators.shape)
+        if not np.isin(found, (-1.0, 0.0, 1.0)).all():
+            raise ArgumentError("approach must be 1, -1 or 0 for each actuator")
+        return found
+
+    def names(self, actuators: Collection[str], components: Collection[str]) -> set[str]:
+        """One for all actuators, or one for each."""
+        return {self.name, *(f"{self.name}.{q}" for q in actuators)}
+
+    def read(self, table: Table, instrument: Reading, units: Sequence[str]) -> FloatArray | None:
+        """Whole numbers (rows, n)."""
+        return read_of_actuators(table, self.name, len(units), table.integers)
+
+    def columns(self, m: Any, units: Sequence[str]) -> Iterator[WrittenColumn]:
+        """One for each actuator."""
+        if m.approach is not None:
+            yield from numbered(self.name, "", m.approach.astype(np.int64))
+
+    def said(self, m: Any) -> str:
+        """That it is stated."""
+        return "" if m.approach is None else "approach stated"

@@ -1,0 +1,139 @@
+"""A field of the rows of measurements: all that the package knows of it stands in its one class.
+
+Its array and what is checked of it, its columns in a file and in a data frame, and what the printed
+table says of it. `Measurements` names the fields it has; who reads, writes, joins and prints asks
+them, in their order there.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Collection, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pkmcal.arrays import FloatArray, Int64Array
+from pkmcal.exceptions import ArgumentError
+from pkmcal.files.csv_table import Table
+from pkmcal.files.csv_writer import WrittenColumn
+from pkmcal.readings.reading import Reading
+from pkmcal.readings.rows import numbers
+
+
+class Field:
+    """A field of the rows, which has one entry for each of them.
+
+    Attributes
+    ----------
+    name : str
+        Of the attribute of `Measurements`, its argument and its column.
+    logged : bool
+        Whether it is taken from the log of a controller that is joined.
+    log_first : bool
+        Whether that of a log is taken in the place of the instrument's.
+    """
+
+    name = ""
+    logged = False
+    log_first = False
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
+
+    def kept(self, given: Any, m: Any) -> Any:
+        """Check what the caller gave, and make its array.
+
+        Parameters
+        ----------
+        given : array_like
+            Not None.
+        m : Measurements
+            With actuators, values, instrument and the fields that stand before this one.
+
+        Raises
+        ------
+        ValueError, TypeError
+            What does not fit; the message names the argument.
+        """
+        raise NotImplementedError
+
+    def of(self, m: Any) -> Any:
+        """The array of some measurements, or None."""
+        return getattr(m, self.name)
+
+    def names(self, actuators: Collection[str], components: Collection[str]) -> set[str]:
+        """Names of its columns in a file of these actuators and components of readings."""
+        return {self.name}
+
+    def read(self, table: Table, instrument: Reading, units: Sequence[str]) -> Any:
+        """What a table states; None where it states nothing. `units` are those of the actuators."""
+        return None
+
+    def columns(self, m: Any, units: Sequence[str]) -> Iterator[WrittenColumn]:
+        """Its columns in a file; none where it is None."""
+        if self.of(m) is not None:
+            yield WrittenColumn(self.name, "", self.of(m))
+
+    def framed(self, m: Any) -> Iterator[WrittenColumn]:
+        """Its columns in a data frame."""
+        return self.columns(m, m.actuator_units or ("mm",) * m.actuators.shape[1])
+
+    def printed(self, m: Any) -> Iterator[WrittenColumn]:
+        """Its columns in the printed table."""
+        return iter(())
+
+    def said(self, m: Any) -> str:
+        """What the title of the printed table says of it, or nothing."""
+        return ""
+
+
+def row_fields(measurements: type) -> tuple[Field, ...]:
+    """The fields that a class of measurements has, in the order of its attributes."""
+    every = (each.default for each in dataclasses.fields(measurements))
+    return tuple(each for each in every if isinstance(each, Field))
+
+
+def declared(field: Field) -> Any:
+    """The default of an attribute of the class, which is the field itself."""
+    return field
+
+
+def row_numbers(name: str, given: ArrayLike, rows: int) -> FloatArray:
+    """A copy as finite doubles, one per row; of one row the number alone will do."""
+    array = numbers(name, given)
+    array = array[None] if rows == 1 and array.ndim == 0 else array
+    if array.shape != (rows,):
+        raise ArgumentError(f"{name} must have shape ({rows},); found {array.shape}")
+    return array
+
+
+def integers(name: str, given: ArrayLike, rows: int) -> Int64Array:
+    """A copy as whole numbers, one per row."""
+    array = row_numbers(name, given, rows)
+    if (array != np.round(array)).any():
+        row = int(np.argmax(array != np.round(array)))
+        raise ArgumentError(f"{name} must be whole numbers; found {array[row]} in row {row}")
+    return array.astype(np.int64)
+
+
+def of_actuators(
+    name: str, given: ArrayLike, shape: tuple[int, ...], blank: bool = False
+) -> FloatArray:
+    """Numbers of each actuator (N, n), given for all, for each or for each row."""
+    found = numbers(name, given, blank)
+    if found.shape not in ((), shape[1:], shape):
+        raise ArgumentError(
+            f"{name} must be one number or have shape {shape[1:]} or {shape}; found {found.shape}"
+        )
+    return np.array(np.broadcast_to(found, shape))
+
+
+def one_or_each(name: str, units: Sequence[str], values: FloatArray) -> Iterator[WrittenColumn]:
+    """A column for all actuators where they have the same unit and numbers, else one for each."""
+    if len(set(units)) == 1 and (values == values[:, :1]).all():
+        yield WrittenColumn(name, units[0], values[:, 0])
+        return
+    for i, (unit, column) in enumerate(zip(units, values.T, strict=True)):
+        yield WrittenColumn(f"{name}.q{i + 1}", unit, column)

@@ -1,0 +1,44 @@
+"""Fields that number rows: the pose they repeat, the line they were read from."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+from typing import Any
+
+from pkmcal.arrays import Int64Array
+from pkmcal.files.csv_table import Table
+from pkmcal.files.csv_writer import WrittenColumn
+from pkmcal.measurements.field import Field, integers
+from pkmcal.readings.reading import Reading
+
+
+class Group(Field):
+    """Rows with the same number are repeats of one pose."""
+
+    def kept(self, given: Any, m: Any) -> Int64Array:
+        """Whole numbers (N,)."""
+        return integers(self.name, given, len(m))
+
+    def read(self, table: Table, instrument: Reading, units: Sequence[str]) -> Int64Array | None:
+        """Whole numbers."""
+        return table.integers(self.name) if self.name in table.columns else None
+
+    def printed(self, m: Any) -> Iterator[WrittenColumn]:
+        """Its column."""
+        return self.framed(m)
+
+
+class Lines(Field):
+    """The line of each row in the file it was read from; no column states it."""
+
+    def kept(self, given: Any, m: Any) -> Int64Array:
+        """Whole numbers (N,)."""
+        return integers(self.name, given, len(m))
+
+    def names(self, actuators: Collection[str], components: Collection[str]) -> set[str]:
+        """None."""
+        return set()
+
+    def columns(self, m: Any, units: Sequence[str]) -> Iterator[WrittenColumn]:
+        """None."""
+        return iter(())

@@ -1,0 +1,58 @@
+"""The session of each row: when it was measured, by a name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from pkmcal import display
+from pkmcal.arguments import shown, words
+from pkmcal.arrays import TextArray
+from pkmcal.exceptions import ArgumentError
+from pkmcal.files.csv_table import Table
+from pkmcal.files.csv_writer import WrittenColumn
+from pkmcal.files.reading import LONGEST_NAME
+from pkmcal.measurements.field import Field
+from pkmcal.readings.reading import Reading
+from pkmcal.readings.rows import is_name
+
+
+class Session(Field):
+    """When the rows were measured."""
+
+    logged = True
+
+    def kept(self, given: Any, m: Any) -> TextArray:
+        """One name per row, given for all or for each."""
+        named = given.tolist() if isinstance(given, np.ndarray) else given
+        names = words("session", named)
+        if isinstance(named, str):
+            names = names * len(m)
+        if len(names) != len(m):
+            raise ArgumentError(
+                f"session must be one name, or one for each of {len(m)} rows; found {len(names)}"
+            )
+        for name in dict.fromkeys(names):
+            if not is_name(name) or "@" in name:
+                raise ArgumentError(
+                    "session must be a name on one line, of at most"
+                    f" {LONGEST_NAME} characters and without '@'; found {shown(name)}"
+                )
+        return np.array(names)
+
+    def read(self, table: Table, instrument: Reading, units: Sequence[str]) -> TextArray | None:
+        """Names."""
+        return np.array(table.texts(self.name)) if self.name in table.columns else None
+
+    def printed(self, m: Any) -> Iterator[WrittenColumn]:
+        """Its column, where there are several sessions."""
+        return self.framed(m) if len(m.sessions) > 1 else iter(())
+
+    def said(self, m: Any) -> str:
+        """Their names."""
+        if not m.sessions:
+            return ""
+        many = "s" if len(m.sessions) > 1 else ""
+        return f"session{many} {', '.join(map(display.printable, m.sessions))}"

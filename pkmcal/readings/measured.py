@@ -1,0 +1,75 @@
+"""What readings ask of the rows they are of: `Measurements` and the sets of a calibration."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+from pkmcal.arrays import FloatArray, Int64Array
+from pkmcal.kinematics.drive_state import DriveState
+
+
+class Measured(Protocol):
+    """Rows of measurements; `Measurements` describes each attribute."""
+
+    def __len__(self) -> int:
+        """Number of rows."""
+
+    @property
+    def actuators(self) -> FloatArray:
+        """Actuator coordinates (N, n)."""
+
+    @property
+    def values(self) -> FloatArray:
+        """What was measured, (N, k) or (N,)."""
+
+    @property
+    def instrument(self) -> Any:
+        """The reading."""
+
+    @property
+    def target(self) -> FloatArray | None:
+        """Targets as given."""
+
+    @property
+    def targets(self) -> FloatArray:
+        """The target of every row (N, 3)."""
+
+    @property
+    def target_index(self) -> Int64Array | None:
+        """Which of several targets each row measured."""
+
+    @property
+    def target_names(self) -> tuple[str, ...] | None:
+        """Their names."""
+
+    @property
+    def drive_state(self) -> DriveState:
+        """From where actuators came, and the tension of what they drive."""
+
+    def of_points(self, place: FloatArray | None) -> FloatArray:
+        """A point of every row (N, 3), of one, one a row or one for each target."""
+
+
+class InFit(Protocol):
+    """Rows of a calibration; `FitData` describes each attribute."""
+
+    @property
+    def measured(self) -> Any:
+        """The rows."""
+
+    @property
+    def unknown_frame(self) -> bool:
+        """Whether the instrument's frame is estimated."""
+
+    @property
+    def unknown_target(self) -> bool:
+        """Whether targets are estimated."""
+
+    @property
+    def unknown_attachment(self) -> bool:
+        """Whether attachments are estimated."""
+
+    @property
+    def starts(self) -> Mapping[tuple[str, str], Any]:
+        """Where the search starts for unknowns without a present value."""

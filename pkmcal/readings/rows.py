@@ -1,0 +1,45 @@
+"""Arguments with an entry for every row: arrays of the right shape, or an error that names them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pkmcal.arguments import shown, words
+from pkmcal.arrays import FloatArray, TextArray, as_numbers
+from pkmcal.exceptions import ArgumentError
+from pkmcal.files.reading import LONGEST_NAME
+
+
+def numbers(name: str, given: ArrayLike, blank: bool = False) -> FloatArray:
+    """A copy as finite doubles; `blank`: NaN is a number that is not there."""
+    array = np.array(as_numbers(name, given, "n"), dtype=np.float64, order="C")
+    wrong = np.isinf(array) if blank else ~np.isfinite(array)
+    if wrong.any():
+        first = tuple(int(i) for i in np.argwhere(wrong)[0])
+        where = f" at index {', '.join(map(str, first))}" if first else ""
+        raise ArgumentError(f"{name} must be finite; found {array[first]}{where}")
+    return array
+
+
+def is_name(text: str) -> bool:
+    """Whether a name can be written and read: on one line, not empty, not too long."""
+    return 0 < len(text) <= LONGEST_NAME and text == " ".join(text.split())
+
+
+def names(argument: str, given: Sequence[str] | TextArray, rows: int) -> TextArray:
+    """One name per row; of one row the name alone will do."""
+    if isinstance(given, str) and rows == 1:
+        given = [given]
+    found = words(argument, given.tolist() if isinstance(given, np.ndarray) else given)
+    if isinstance(given, str) or len(found) != rows:
+        raise ArgumentError(f"{argument} must be {rows} names, one a row; found {shown(given)}")
+    for name in dict.fromkeys(found):
+        if not is_name(name):
+            raise ArgumentError(
+                f"{argument} must be names on one line, of at most {LONGEST_NAME} characters;"
+                f" found {shown(name)}"
+            )
+    return np.array(found)

@@ -1,0 +1,156 @@
+"""What every kind of reading obeys, also one that is no part of the package."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+import pkmcal as pk
+from pkmcal.estimation.equations import Equations
+from pkmcal.estimation.fit_data import FitData
+from pkmcal.estimation.free_parameters import parameters
+from pkmcal.estimation.parameters import Asked
+from pkmcal.estimation.starts import with_starts
+from pkmcal.readings.registry import KINDS
+
+from ..simulated import with_errors
+from .cases import CASES, NOISE, ROWS, Case
+
+SIGMA = 0.5  # mm; errors of the machine
+
+EVERY = pytest.mark.parametrize("case", CASES, ids=[case.name for case in CASES])
+READING = pytest.mark.parametrize(
+    "case", [c for c in CASES if c.name != "closure"], ids=lambda case: case.name
+)
+
+
+def test_every_registered_kind_has_a_case() -> None:
+    names = {case.name.partition(" ")[0] for case in CASES}
+    assert {*KINDS} - names == {"touch-distance"}  # which `identify` makes of touches
+
+
+@pytest.mark.parametrize("unknown", [False, True], ids=["known", "unknown"])
+@READING
+def test_derivatives_are_those_of_differences(case: Case, unknown: bool) -> None:
+    """By the machine's numbers, through the pose; by the frame; by each argument of the reading."""
+    robot, rows = pk.load(case.machine), 12
+    measured = case.measured(robot, rows, 7, 3.0)
+    target = unknown and "target" in case.unknown
+    (share,) = with_starts(robot, [FitData(measured, np.arange(rows), unknown, target, unknown)])
+    free = None if case.machine != "hexapod" else ["base*", "offset*", "gain*"]
+    chosen = parameters(robot, [share], Asked(free))
+    equations = Equations.of([share], chosen)
+    theta = chosen.start.copy()
+    if chosen.frame is not None:
+        theta[chosen.frame : chosen.frame + 6] = [400, -200, 90, 0.4, -0.7, 2.0]
+    (jacobian,) = equations.jacobian(equations.at(theta))
+    columns = []
+    for j, scale in enumerate(chosen.scale):
+        step = np.eye(len(theta))[j] * 1e-3 * scale
+        ends = [equations.at(theta + sign * step).residuals[0] for sign in (1, -1)]
+        columns.append((ends[1] - ends[0]) / 2e-3)
+    expected = np.stack(columns, axis=-1)
+    atol = 2e-7 * np.abs(expected).max()
+    np.testing.assert_allclose(jacobian * chosen.scale, expected, rtol=0, atol=atol)
+
+
+@EVERY
+def test_columns_are_read_back_to_the_last_bit(case: Case, tmp_path: Path) -> None:
+    measured = case.measured(pk.load(case.machine), 7, 3, NOISE)
+    measured.write(tmp_path / "m.csv")
+    again = pk.read_measurements(tmp_path / "m.csv", kind=case.own)
+    assert again.kind == measured.kind and again.notes == ()
+    assert again.values.tobytes() == measured.values.tobytes()
+    assert again.actuators.tobytes() == measured.actuators.tobytes()
+    for each in dataclasses.fields(measured.instrument):
+        one, other = (getattr(m.instrument, each.name) for m in (measured, again))
+        assert np.array_equal(one, other), each.name
+    assert str(again) == str(measured)
+
+
+@EVERY
+def test_rows_take_what_the_instrument_has_of_them_along(case: Case) -> None:
+    measured = case.measured(pk.load(case.machine), 7, 3, NOISE)
+    rows = [5, 2]
+    part = measured.select(rows).instrument
+    for name in (*part.per_row, *part.labels):
+        whole = getattr(measured.instrument, name)
+        np.testing.assert_array_equal(getattr(part, name), whole[rows])
+
+
+@EVERY
+def test_what_a_simulation_was_told_is_not_in_its_measurements(case: Case) -> None:
+    measured = case.measured(pk.load(case.machine), 7, 3, NOISE)
+    plain = {f.name: f.default for f in dataclasses.fields(measured.instrument)}
+    for name in measured.instrument.truth:
+        assert np.array_equal(getattr(measured.instrument, name), plain[name])
+
+
+@pytest.mark.filterwarnings("ignore:the measurements contradict the prior")  # by chance
+@READING
+def test_all_its_unknowns_are_found_from_nothing_as_well_as_is_said(case: Case) -> None:
+    """Errors of all numbers that are known here, by their covariance: chi-square distributed."""
+    robot = pk.load(case.machine)
+    true = with_errors(robot, SIGMA, np.random.default_rng(1))
+    measured = case.measured(true, ROWS, 1, NOISE)
+    found = pk.identify(robot, measured, prior=SIGMA, holdout=0.25, unknown=case.unknown)
+    known = [i for i, name in enumerate(found.free) if name in robot.geometry.names]
+    off = found.values[known] - [true.geometry[found.free[i]] for i in known]
+    covariance = found.covariance[np.ix_(known, known)]
+    distance = off @ np.linalg.solve(covariance, off)
+    assert 1e-4 < chi2.cdf(distance, len(known)) < 1 - 1e-4
+    assert found.holdout_rms == pytest.approx(found.holdout_expected, rel=0.6)
+    assert found.verdict.state != "not calibrated", str(found.verdict)
+
+
+@READING
+def test_words(case: Case) -> None:
+    measured = case.measured(pk.load(case.machine), 3, 3, NOISE)
+    reading = measured.instrument
+    assert reading.noun(3) in str(measured) and reading.noun(1) != reading.noun(2)
+    assert type(reading).__doc__ and reading.name in measured.kind
+    assert len(reading.mm(measured, 100.0)) == len(measured.units)
+
+
+@pytest.mark.parametrize(
+    "case", [c for c in CASES if c.name in ("tilt", "spot", "height")], ids=lambda case: case.name
+)
+def test_poses_are_planned_for_the_object(case: Case) -> None:
+    robot = pk.load(case.machine)
+    _, instrument = case.draw(robot, 1, np.random.default_rng(0))
+    candidates = pk.sample_poses(robot, 40, seed=2)
+    plan = pk.plan_poses(
+        robot, candidates, 15, kind=instrument, target=case.target, prior=SIGMA, free="offset*"
+    )
+    assert plan.kinds == (instrument.name,) * 15 and plan.predicted < plan.at_random
+
+
+def test_readings_with_entries_of_their_own_in_each_row_are_not_planned() -> None:
+    robot = pk.load("hexapod")
+    kind = pk.readings.RelativeDistance(run=["A"])
+    with pytest.raises(pk.ArgumentError, match="kind: relative distances state run for every row"):
+        pk.plan_poses(robot, pk.sample_poses(robot, 5), 3, kind=kind, target=[900.0, 0, 0])
+
+
+def test_values_that_are_grossly_off_in_a_unit_of_ones_own_are_judged() -> None:
+    spot = next(case for case in CASES if case.name == "spot")
+    robot = pk.load(spot.machine)
+    measured = spot.measured(robot, 30, 3, NOISE)
+    wrong = dataclasses.replace(measured, values=measured.values * -3.0)
+    with pytest.warns(pk.CalibrationWarning):
+        found = pk.identify(robot, wrong, free="offset*", prior=SIGMA)
+    assert found.verdict.state == "not calibrated"
+
+
+def test_a_unit_of_which_nobody_says_what_it_is_worth_is_refused_by_name() -> None:
+    class Plain(type(CASES[-1].own)):  # type: ignore[misc]
+        mm = pk.readings.Reading.mm
+
+    robot = pk.load("hexapod")
+    measured = pk.VirtualMachine(robot, NOISE).measure(robot.inverse(robot.home), Plain())
+    with pytest.raises(pk.ArgumentError, match="'spot' has to state in its method mm what one px"):
+        pk.identify(robot, measured, free="offset*", prior=SIGMA)
