@@ -14,6 +14,7 @@ import numpy as np
 import pkmcal as pk
 from benchmarks.fits import Draw, Parts, timed
 from benchmarks.timing import Report, medians
+from pkmcal.calibration.asked import unknown_roles
 from pkmcal.diagnostics.robust_check import robust_check
 from pkmcal.estimation.begin import begun, estimator_at
 from pkmcal.estimation.datasets import as_fit_data, by_set
@@ -60,7 +61,7 @@ def offsets(rng: np.random.Generator, **options: Any) -> Case:
 
 def framed(rng: np.random.Generator) -> Case:
     """The same with an unknown frame and target."""
-    return offsets(rng, frame="unknown", target="unknown")
+    return offsets(rng, unknown=["frame", "target"])
 
 
 def all_numbers(rng: np.random.Generator) -> Case:
@@ -100,8 +101,7 @@ CASES: dict[str, Callable[[np.random.Generator], Case]] = {
 
 def searched(case: Case, log: pk.Measurements) -> object:
     """From measurements to the least-squares solution, without a word about it."""
-    words = {"frame": "known", "target": "known", "attachment": "known"}
-    unknown = {name: case.options.get(name, word) for name, word in words.items()}
+    unknown = unknown_roles(case.options.get("unknown", ()))
     data = as_fit_data(case.robot, log, unknown, False, None)
     asked = Asked(
         case.options.get("free"), case.options.get("prior"), None, (), by_set(unknown), ()

@@ -3,22 +3,60 @@
 from __future__ import annotations
 
 import difflib
+import functools
 import math
 import os
 import sys
-from collections.abc import Collection, Iterable
+import warnings
+from collections.abc import Callable, Collection, Iterable
 from concurrent.futures import Executor
 from pathlib import Path
-from typing import TypeVar, cast
+from typing import Any, ParamSpec, TypeVar, cast
 
 import numpy as np
 
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 
+P = ParamSpec("P")
 T = TypeVar("T")
 W = TypeVar("W", bound=str)  # of a Literal
 
 _SQUARED = 1e150  # of numbers up to this one squares are numbers
+
+
+def earlier_keywords(
+    *names: str, now: Callable[[dict[str, Any], dict[str, Any]], dict[str, Any]]
+) -> Callable[[Callable[P, T]], Callable[P, T]]:
+    """Let a function take keywords of the version before, with a warning that says the new ones.
+
+    Parameters
+    ----------
+    names : str
+        The keywords of the version before.
+    now : callable
+        What it returns replaces them: today's keywords, from those of before that were given, and
+        from the others beside them.
+    """
+
+    def decorated(function: Callable[P, T]) -> Callable[P, T]:
+        @functools.wraps(function)
+        def called(*positional: P.args, **given: P.kwargs) -> T:
+            before = {name: given.pop(name) for name in names if name in given}
+            if before:
+                new = now(before, given)
+                written = ", ".join(f"{name}={value!r}" for name, value in new.items())
+                warnings.warn(
+                    f"{function.__name__}: {', '.join(f'{name}=' for name in before)} will go in"
+                    f" the next version; {f'write {written}' if written else 'leave it out'}",
+                    DeprecationWarning,
+                    stacklevel=2,
+                )
+                given.update(new)
+            return function(*positional, **given)
+
+        return called
+
+    return decorated
 
 
 def number(name: str, value: object, least: float = -math.inf, above: float = -math.inf) -> float:

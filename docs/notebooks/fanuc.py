@@ -31,7 +31,7 @@ measured
 # Base and reflectors alone: how far off the arm is as it was designed.
 
 # %%
-unknown = {"frame": "unknown", "target": "unknown"}
+unknown = {"unknown": ["frame", "target"]}
 nominal = pk.identify(arm, measured, free="joint1.dx", **unknown)
 print(f"{nominal.rms:.3f} mm rms")
 

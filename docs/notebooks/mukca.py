@@ -33,7 +33,7 @@ measured = pk.Measurements(
 measured
 
 # %%
-found = pk.identify(arm, measured, target="unknown", prior=1.0)
+found = pk.identify(arm, measured, unknown="target", prior=1.0)
 found
 
 # %% [markdown]

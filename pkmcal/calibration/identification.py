@@ -43,7 +43,8 @@ _UNIDENTIFIABLE = 1e-3  # mm a pose moves per mm along an unidentifiable combina
 class Identification(Solution, Result):
     """What `identify` found. Arrays are in the order of `free`; mm and rad.
 
-    Its parts are those of `Solution`, its numbers the flat names there.
+    Its numbers are attributes that its base classes describe: `ParameterTable`, `Identifiability`,
+    `Misfit`, `Repeats`, `HeldOut` for points that were not fitted, and `Solution` for the rest.
     """
 
     @cached_property

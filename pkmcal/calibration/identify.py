@@ -5,8 +5,16 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 
-from pkmcal.arguments import word, words
+from pkmcal.arguments import earlier_keywords, word, words
 from pkmcal.arms.arm import SerialArm
+from pkmcal.calibration.asked import (
+    EARLIER,
+    Unknown,
+    effects_on,
+    fixed_names,
+    now,
+    unknown_roles,
+)
 from pkmcal.calibration.identification import Identification
 from pkmcal.calibration.steps import (
     begin,
@@ -21,26 +29,20 @@ from pkmcal.calibration.steps import (
     without_slack,
 )
 from pkmcal.diagnostics.row_errors import likely_mistakes
-from pkmcal.effects.effect import Effect
-from pkmcal.effects.expansion import Coefficients, expansion_of
+from pkmcal.effects.effect import Effects
 from pkmcal.estimation.datasets import as_fit_data, by_set
 from pkmcal.estimation.free_parameters import parameters
 from pkmcal.estimation.loss import LIMITS, LossName
-from pkmcal.estimation.parameters import Asked, Bounds, Known, Prior
+from pkmcal.estimation.parameters import Asked, Bounds, Prior
 from pkmcal.exceptions import ArgumentError, CalibrationWarning
-from pkmcal.fitted.datum import DATUMS, DatumRule
-from pkmcal.fitted.dropped import (
-    OUTLIERS,
-    Drop,
-    named_rows,
-)
-from pkmcal.fitted.slack import SLACK, Slack
+from pkmcal.fitted.dropped import Drop, left_out
 from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.statistics.covariance import RULES, CovarianceRule
 
 
+@earlier_keywords(*EARLIER, now=now)
 def identify(
     robot: Robot | SerialArm,
     measurements: Measurements | Sequence[Measurements],
@@ -48,19 +50,14 @@ def identify(
     *,
     prior: Prior = None,
     loss: LossName = "linear",
-    frame: Known | Sequence[Known] = "known",
-    target: Known | Sequence[Known] = "known",
+    unknown: Unknown = (),
     holdout: float | Measurements | None = None,
     bounds: Bounds = None,
-    attachment: Known | Sequence[Known] = "known",
     covariance: CovarianceRule = "auto",
     per_session: str | Sequence[str] = (),
     fix: str | Sequence[str] = (),
-    datum: DatumRule = "none",
     drop: Drop = None,
-    expansion: Coefficients = None,
-    slack: Slack = "keep",
-    effects: Sequence[Effect] = (),
+    effects: Effects = (),
 ) -> Identification:
     """Find the geometry that agrees best with measurements.
 
@@ -86,25 +83,27 @@ def identify(
         None: no prior; unidentifiable combinations then move as little as possible.
     loss : {"linear", "huber", "cauchy"}
         Weight of rows with large residuals, by the length of the whole measured vector.
-    frame : {"known", "unknown"} or a sequence of them
-        Whether the instrument's frame is the robot's base frame or is to be found: six parameters
-        ``frame.x`` … ``frame.gamma``, the pose of the base in the instrument's frame. Of several
-        sets one word says that all have the same frame; one word each, that each unknown one is
-        another, ``frame.x@2``. No start near it is needed.
-    target : {"known", "unknown"} or a sequence of them
-        Whether the measured points of the platform are known or to be found, from where
-        `Measurements.target` puts them: ``target1.x`` …; for distances the fixed point,
-        ``anchor1.x`` …; for orientations how the sensor is mounted, ``mounting.alpha`` …; for poses
-        where on the platform what was measured is, ``tool.x`` … ``tool.gamma``, without a start.
-        One word, or one each, as for frames.
+    unknown : str, sequence of str or mapping
+        What is to be found beside the numbers of the machine: "frame", "target", "attachment", or
+        several of them. No start near them is needed.
+
+        "frame": the instrument's frame is not the robot's base frame: six parameters ``frame.x`` …
+        ``frame.gamma``, the pose of the base in the instrument's frame.
+        "target": the measured points of the platform, from where `Measurements.target` puts them:
+        ``target1.x`` …; for distances the fixed point, ``anchor1.x`` …; for orientations how the
+        sensor is mounted, ``mounting.alpha`` …; for poses where on the platform what was measured
+        is, ``tool.x`` … ``tool.gamma``.
+        "attachment": the points of the platform from which distances are measured, from where
+        `Measurements.attachment` puts them: ``attachment1.x`` ….
+
+        Of several sets all have the same frame and points. Where they differ a mapping has a word
+        for each set, ``{"frame": ["unknown", "known", "unknown"]}``: each unknown one is another,
+        ``frame.x@3``.
     holdout : float or Measurements, optional
         A fraction of the poses of each set, drawn at random with repeats kept together, or other
         measurements: they are not fitted, only compared.
     bounds : mapping of str to (float, float), optional
         Lower and upper limit by name or wildcard, mm and rad.
-    attachment : {"known", "unknown"} or a sequence of them
-        Whether the points of the platform from which distances are measured are known or to be
-        found, from where `Measurements.attachment` puts them: ``attachment1.x`` ….
     covariance : {"auto", "classical", "cluster"}
         How uncertain the parameters are. "cluster": rows of one pose may share an error, as
         several targets and repeats do. "classical": all errors are independent. "auto": cluster
@@ -119,25 +118,22 @@ def identify(
     fix : str or sequence of str
         Numbers of the geometry, by name or wildcard, that keep their present values though `free`
         or the robot's default set has them.
-    datum : {"none", "auto"}
-        "auto": also hold as many numbers as the measurements leave open of where the base frame and
-        the platform frame lie, and of how the frames between an arm's joints are drawn: about
-        3-2-1 of the joints of each. What is predicted of a measurement stays the same, and the
-        other numbers have finite deviations, in the frames that the held ones define. They are
-        `Identification.datum`. "none": such combinations move as little as possible.
-    drop : sequence of int or "outliers", optional
-        Rows that are left out, fitted or drawn to be held out: by their numbers, counted from 0
-        through all sets, or those that the others contradict in a robust fit. They are
+
+        The word "datum" holds as many numbers as the measurements leave open of where the base
+        frame and the platform frame lie, and of how the frames between an arm's joints are drawn:
+        about 3-2-1 of the joints of each. What is predicted of a measurement stays as it is, and
+        the other numbers have finite deviations, in the frames that the held ones define. They are
+        `Identification.datum`. Without it such combinations move as little as possible.
+    drop : int, "outliers", "slack" or several of them, optional
+        What is left out. Rows, fitted or drawn to be held out, by their numbers, counted from 0
+        through all sets; "outliers": rows that the others contradict in a robust fit. They are
         `Identification.dropped`. Of other measurements that are held out the "outliers" are
         `Identification.holdout_dropped`; where most rows contradict the fit none is left out.
-    expansion : float or mapping of str to float, optional
-        Coefficients of thermal expansion in 1/K, of steel 11.5e-6: one for all, or of "base",
-        "platform" (with the targets on it), "limbs" or single ones, "limb3"; parts that are not
-        named do not grow. With `Measurements.temperature` the numbers are those at 20 °C.
-    slack : {"keep", "drop"}
-        What becomes of readings of cables that the others show to be slack, on a machine with more
-        cables than needed: "keep" says so in a warning, "drop" leaves these readings out and keeps
-        the rest of their rows. They are `Identification.slack`.
+        "slack": readings of cables that the others show to be slack, on a machine with more cables
+        than needed; the rest of their rows is kept. They are `Identification.slack`; without the
+        word a warning names them.
+    effects : sequence of effects
+        What moves the machine off the pose that its geometry gives: ``[pk.Expansion(11.5e-6)]``.
 
     Returns
     -------
@@ -170,27 +166,24 @@ def identify(
     0.3
     """
     machine = as_machine(robot)
-    unknown = {"frame": frame, "target": target, "attachment": attachment}
-    anew = words("per_session", per_session)
-    asked = Asked(free, prior, bounds, anew, by_set(unknown), words("fix", fix))
-    grows = expansion_of(machine, expansion)
-    every = tuple(effects) if grows is None else (grows, *effects)
-    given = as_fit_data(machine, measurements, unknown, bool(anew), every)
-    named = named_rows(drop, sum(len(data.rows) for data in given))
-    rows = prepare(machine, given, holdout, named, bool(anew))
+    roles, anew = unknown_roles(unknown), words("per_session", per_session)
+    fixed, find_datum = fixed_names(fix)
+    asked = Asked(free, prior, bounds, anew, by_set(roles), fixed)
+    moving = effects_on(machine, effects)
+    given = as_fit_data(machine, measurements, roles, bool(anew), moving)
+    out = left_out(drop, sum(len(data.rows) for data in given))
+    rows = prepare(machine, given, holdout, out.rows, bool(anew))
     chosen = parameters(machine, rows.fitted, asked)
     word("loss", loss, LIMITS)
     word("covariance", covariance, RULES)
-    word("datum", datum, DATUMS)
-    word("slack", slack, SLACK)
     problem = begin(rows, chosen)
     try:
-        if drop == OUTLIERS:
+        if out.outliers:
             rows, problem = without_outliers(rows, problem, chosen)
-        if slack == "drop":
+        if out.slack:
             problem = without_slack(problem)
         fitted = solve(problem, loss)
-        if datum == "auto":
+        if find_datum:
             fitted = with_datum(fitted, rows, asked)
     except ValueError as error:
         hint = likely_mistakes(rows.fitted, chosen, problem.start)
@@ -199,8 +192,8 @@ def identify(
         raise ArgumentError("; ".join([f"measurements: {error}", *hint])) from None
     fitted = with_component_noise(fitted)
     sure = judged(fitted, covariance)
-    rows, held = compare(rows, fitted, sure, outliers=drop == OUTLIERS)
-    found = result(rows, fitted, sure, held, find_slack=slack == "keep")
+    rows, held = compare(rows, fitted, sure, out.outliers)
+    found = result(rows, fitted, sure, held, find_slack=not out.slack)
     for text in found.warnings:
-        warnings.warn(text, CalibrationWarning, stacklevel=2)
+        warnings.warn(text, CalibrationWarning, stacklevel=3)  # of who called, beyond the adapter
     return found

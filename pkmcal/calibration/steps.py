@@ -27,8 +27,13 @@ from pkmcal.estimation.free_parameters import parameters
 from pkmcal.estimation.loss import LossName
 from pkmcal.estimation.parameters import Asked, Parameters
 from pkmcal.estimation.starts import known_distances
-from pkmcal.estimation.uncertainty import Solution as LinearModel
-from pkmcal.estimation.uncertainty import Uncertainty, solved, uncertainty, unlike_components
+from pkmcal.estimation.uncertainty import (
+    LinearModel,
+    Uncertainty,
+    solved,
+    uncertainty,
+    unlike_components,
+)
 from pkmcal.exceptions import ArgumentError
 from pkmcal.fitted.datum import NO_DATUM, Datum
 from pkmcal.fitted.datum import datum as choose_datum

@@ -13,6 +13,7 @@ import typer
 
 import pkmcal as pk
 from pkmcal.arguments import word
+from pkmcal.calibration.asked import Role
 from pkmcal.cli.geometry_options import (
     free_names,
     matching,
@@ -43,7 +44,7 @@ from pkmcal.estimation.parameters import KNOWN, Known
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.number_text import typed
 from pkmcal.files.reading import Input
-from pkmcal.fitted.datum import DATUMS
+from pkmcal.fitted.dropped import Found
 from pkmcal.kinematics.calibratable import Calibratable, as_machine
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.tracker import Tracker
@@ -256,6 +257,9 @@ def calibrate(
     chosen = [name for name in free_names(machine, free) if name not in fixed]
     if fixed and not chosen:
         raise ArgumentError(f"--fix {','.join(fix or [])}: no parameter is left free")
+    found_rows: dict[Found, bool] = {"outliers": drop_outliers, "slack": drop_slack}
+    held_by_datum = ["datum"] if word("--datum", datum, ("none", "auto")) == "auto" else []
+    coefficients = read_coefficients("--expansion", expansion or [])
     with progress("identifying"), warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # the summary has them
         found = pk.identify(
@@ -264,17 +268,13 @@ def calibrate(
             free=chosen or None,
             prior=read_prior(prior or [], machine, chosen),
             loss=word("--loss", loss, LIMITS),
-            frame=_known("--frame", frame, measured),
-            target=_known("--target", target, measured),
-            attachment=_known("--attachment", attachment, measured),
+            unknown=_unknown(frame, target, attachment, measured),
             holdout=held,
             covariance=word("--covariance", covariance, RULES),
             per_session=anew,
-            fix=fixed,
-            datum=word("--datum", datum, DATUMS),
-            drop="outliers" if drop_outliers else dropped,
-            expansion=read_coefficients("--expansion", expansion or []),
-            slack="drop" if drop_slack else "keep",
+            fix=[*fixed, *held_by_datum],
+            drop=[*dropped, *(each for each, asked in found_rows.items() if asked)],
+            effects=[] if coefficients is None else [pk.Expansion(coefficients)],
         )
     if output is not None:
         with progress("picture"), output.draft() as draft:
@@ -370,6 +370,17 @@ def _approached(text: str, measured: Measurements) -> Measurements:
     if measured.approach is not None:
         raise ArgumentError(f"--approach: {measured.file} has columns approach")
     return replace(measured, approach="order")  # type: ignore[arg-type]
+
+
+def _unknown(
+    frame: str, target: str, attachment: str, measured: Sequence[Measurements]
+) -> dict[Role, Known | list[Known]]:
+    """What ``--frame``, ``--target`` and ``--attachment`` say of each file."""
+    return {
+        "frame": _known("--frame", frame, measured),
+        "target": _known("--target", target, measured),
+        "attachment": _known("--attachment", attachment, measured),
+    }
 
 
 def _known(option: str, text: str, measured: Sequence[Measurements]) -> Known | list[Known]:

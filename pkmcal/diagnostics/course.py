@@ -26,31 +26,21 @@ def _expands(found: Solution, seen: Drift) -> tuple[Remedy, ...]:
 
 CHECKS = (
     Check(
-        name="drift",
-        about="poses that were measured again moved with time",
-        levels=("doubt", "remark"),
-        run=_drift,
-        level_of=_level,
-        say=lambda found, seen: str(seen),
+        name="drift", about="poses that were measured again moved with time",
+        levels=("doubt", "remark"), run=_drift, level_of=_level, say=lambda found, seen: str(seen),
         remedies=_expands,
     ),
     Check(
-        name="measuring-order",
-        about="residuals follow the order of measuring",
-        unless=("grave", "drift"),
-        levels=("doubt", "remark"),
-        run=lambda found: at_most_one(measuring_order(found.fit, found.outliers)),
-        level_of=_level,
+        name="measuring-order", about="residuals follow the order of measuring",
+        unless=("grave", "drift"), levels=("doubt", "remark"),
+        run=lambda found: at_most_one(measuring_order(found.fit, found.outliers)), level_of=_level,
         say=lambda found, seen: str(seen),
     ),
     Check(
-        name="displaced-target",
-        about="a known target seems to be elsewhere than it is stated",
-        unless=("grave",),
-        levels=("doubt", "remark"),
-        run=lambda found: at_most_one(displaced_target(found.fit)),
-        level_of=_level,
+        name="displaced-target", about="a known target seems to be elsewhere than it is stated",
+        unless=("grave",), levels=("doubt", "remark"),
+        run=lambda found: at_most_one(displaced_target(found.fit)), level_of=_level,
         say=lambda found, seen: str(seen),
         remedies=lambda found, seen: (Remedy("unknown", "target"),),
     ),
-)
+)  # fmt: skip

@@ -66,7 +66,7 @@ class DisplacedTarget:
         return (
             f"target {self.name}{or_as_well} seems to be at least {value:.2g} {unit} from where it"
             f" is stated ({chance_text(self.chance)}): look how it sits, or find where targets are,"
-            " --target unknown (target='unknown')"
+            " --target unknown (unknown='target')"
         )
 
 

@@ -82,7 +82,7 @@ class Drift:
         else:
             advice = (
                 f"its temperature went from {low:.3g} to {high:.3g} °C: state how it expands,"
-                " --expansion (expansion=)"
+                " --expansion (effects=[pk.Expansion(…)])"
             )
         along = "" if len(self.components) == 1 else f", most of it {most}"
         return (

@@ -75,10 +75,9 @@ def _falls(before: float, after: float) -> str:
 
 CHECKS = (
     Check(
-        name="little-gained",
-        about="the misfit hardly fell, and nothing else says why",
+        name="little-gained", about="the misfit hardly fell, and nothing else says why",
         unless=("grave", "doubt"),
         run=lambda found: (change(found),) if _little_gained(found) else (),
         say=lambda found, changed: f"little was gained, {changed}: {_other_causes(found)}",
     ),
-)
+)  # fmt: skip

@@ -107,41 +107,31 @@ CHECKS = (
     Check(
         name="holdout-few-off",
         about="a few held-out points are off, the others are not, or not much",
-        unless=("holdout-contradicts",),
-        levels=("doubt", "remark"),
-        run=lambda found: at_most_one(found.holdout_outliers or None),
-        level_of=_level_of_few,
-        say=_few_off,
-        remedies=_drop,
+        unless=("holdout-contradicts",), levels=("doubt", "remark"),
+        run=lambda found: at_most_one(found.holdout_outliers or None), level_of=_level_of_few,
+        say=_few_off, remedies=_drop,
     ),
     Check(
         name="moved",
         about="numbers moved between the fitted measurements and others that were held out",
-        run=_moved,
-        say=_moved_text,
-        remedies=lambda found, several: (_anew(several),),
+        run=_moved, say=_moved_text, remedies=lambda found, several: (_anew(several),),
     ),
     Check(
-        name="holdout-fitted-again",
-        about="points were held out at poses where others were fitted",
-        levels=("remark",),
-        run=lambda found: at_most_one(_fitted_again(found) or None),
+        name="holdout-fitted-again", about="points were held out at poses where others were fitted",
+        levels=("remark",), run=lambda found: at_most_one(_fitted_again(found) or None),
         say=lambda found, count: (
             f"{count} of the held-out points are at poses that were fitted as well: they show how"
             " these repeat, not how good the machine is elsewhere"
         ),
     ),
     Check(
-        name="holdout-unreached",
-        about="the machine does not reach rows that were held out",
-        at_once=True,
-        run=lambda found: at_most_one(found.holdout_unreached or None),
+        name="holdout-unreached", about="the machine does not reach rows that were held out",
+        at_once=True, run=lambda found: at_most_one(found.holdout_unreached or None),
         say=lambda found, failures: f"holdout: {failures}; left out",
     ),
     Check(
         name="holdout-nothing-left",
-        about="a held-out session's own numbers take all of its readings",
-        at_once=True,
+        about="a held-out session's own numbers take all of its readings", at_once=True,
         run=lambda found: at_most_one(
             len(found.holdout_own) if found.holdout_spare < LEAST_FREEDOM else None
         ),
@@ -150,4 +140,4 @@ CHECKS = (
             " left to compare; hold out more rows of it"
         ),
     ),
-)
+)  # fmt: skip

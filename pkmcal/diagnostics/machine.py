@@ -171,10 +171,8 @@ def _beyond(robot: Robot, drive: FloatArray) -> BoolArray:
 CHECKS = (
     Check(
         name="implausible-changes",
-        about="numbers moved further than errors of manufacture explain",
-        unless=("unit-errors",),
-        at_once=True,
-        run=lambda found: at_most_one(far_numbers(found) or None),
+        about="numbers moved further than errors of manufacture explain", unless=("unit-errors",),
+        at_once=True, run=lambda found: at_most_one(far_numbers(found) or None),
         say=lambda found, moved: (
             f"{listed(list(moved))} moved by up to {max(moved.values()):.3g} mm, further than"
             " errors of a machine: check that the robot file describes this one, or free fewer"
@@ -184,33 +182,24 @@ CHECKS = (
     ),
     Check(
         name="other-modes",
-        about="rows fit another assembly mode than the one that the fit has for them",
-        at_once=True,
+        about="rows fit another assembly mode than the one that the fit has for them", at_once=True,
         run=lambda found: in_other_modes(found.fit.equations, found.fit.end),
         say=lambda found, text: text,
     ),
     Check(
-        name="distant-points",
-        about="points of the platform were found far away from it",
-        at_once=True,
-        run=_distant_points,
-        say=_distant_text,
+        name="distant-points", about="points of the platform were found far away from it",
+        at_once=True, run=_distant_points, say=_distant_text,
     ),
     Check(
-        name="shrunk",
-        about="a machine of which only touches were read became smaller",
-        at_once=True,
-        run=_shrunk,
+        name="shrunk", about="a machine of which only touches were read became smaller",
+        at_once=True, run=_shrunk,
         say=lambda found, share: (
             f"the poses lie {100 * share:.2g} % closer together than before: touches alone do not"
             " say how large a machine is, state touch_distances or measure a length as well"
         ),
     ),
     Check(
-        name="beyond-strokes",
-        about="actuators are out of the strokes that the robot file states",
-        at_once=True,
-        run=_out_of_stroke,
-        say=_out_of_stroke_text,
+        name="beyond-strokes", about="actuators are out of the strokes that the robot file states",
+        at_once=True, run=_out_of_stroke, say=_out_of_stroke_text,
     ),
-)
+)  # fmt: skip

@@ -157,48 +157,32 @@ def _too_quiet(found: Solution) -> tuple[float, ...]:
 
 CHECKS = (
     Check(
-        name="few-spare-equations",
-        about="few equations are left over to show the noise",
-        run=_few_spare,
-        say=_few_spare_text,
+        name="few-spare-equations", about="few equations are left over to show the noise",
+        run=_few_spare, say=_few_spare_text,
     ),
     Check(
-        name="sigma",
-        about="residuals are far larger than sigma says",
-        at_once=True,
-        run=_too_noisy,
-        say=_too_noisy_text,
-        remedies=_against_noise,
+        name="sigma", about="residuals are far larger than sigma says", at_once=True,
+        run=_too_noisy, say=_too_noisy_text, remedies=_against_noise,
     ),
     Check(
-        name="sets-unlike",
-        about="the sigma of some sets is wrong beside that of the others",
-        at_once=True,
-        run=_unlike_sets,
-        say=_unlike_sets_text,
+        name="sets-unlike", about="the sigma of some sets is wrong beside that of the others",
+        at_once=True, run=_unlike_sets, say=_unlike_sets_text,
     ),
     Check(
         name="noise-unknown",
-        about="too little is left over to estimate the noise of some readings",
-        at_once=True,
-        run=_unestimated,
-        say=_unestimated_text,
+        about="too little is left over to estimate the noise of some readings", at_once=True,
+        run=_unestimated, say=_unestimated_text,
     ),
     Check(
-        name="sigma-too-small",
-        about="± are wider than sigma alone would make them",
-        levels=("remark",),
-        run=_widened,
-        say=_widened_text,
+        name="sigma-too-small", about="residuals are larger than sigma says, which ± count",
+        levels=("remark",), run=_widened, say=_widened_text,
     ),
     Check(
-        name="sigma-too-large",
-        about="residuals are clearly smaller than sigma says",
-        levels=("remark",),
-        run=_too_quiet,
+        name="sigma-too-large", about="residuals are clearly smaller than sigma says",
+        levels=("remark",), run=_too_quiet,
         say=lambda found, ratio: (
             f"the residuals are only {ratio:.2g} times what sigma says: if it is the noise it is"
             " too large, and so are ±"
         ),
     ),
-)
+)  # fmt: skip

@@ -39,11 +39,7 @@ def _wider(found: Solution, test: PriorTest) -> tuple[Remedy, ...]:
 
 CHECKS = (
     Check(
-        name="prior-contradicted",
-        about="the measurements contradict the prior",
-        at_once=True,
-        run=_contradicted,
-        say=_contradicted_text,
-        remedies=_wider,
+        name="prior-contradicted", about="the measurements contradict the prior", at_once=True,
+        run=_contradicted, say=_contradicted_text, remedies=_wider,
     ),
-)
+)  # fmt: skip

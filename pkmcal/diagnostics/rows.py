@@ -77,49 +77,34 @@ CHECKS = (
     Check(
         name="rows-disagree",
         about="some rows carry the least squares: a robust fit is made beside it",
-        levels=("grave", "remark"),
-        run=_robust,
-        level_of=_level_of_robust,
-        say=_disagreement,
+        levels=("grave", "remark"), run=_robust, level_of=_level_of_robust, say=_disagreement,
         remedies=_against_disagreement,
     ),
     Check(
-        name="much-left",
-        about="the residuals are larger than any sound fit leaves",
-        levels=("grave",),
-        run=_much_left,
-        say=_much_left_text,
+        name="much-left", about="the residuals are larger than any sound fit leaves",
+        levels=("grave",), run=_much_left, say=_much_left_text,
     ),
     Check(
-        name="rows-left-out",
-        about="rows were left out as asked",
-        levels=("remark",),
-        run=lambda found: at_most_one(found.left_out or None),
-        say=lambda found, text: text,
+        name="rows-left-out", about="rows were left out as asked", levels=("remark",),
+        run=lambda found: at_most_one(found.left_out or None), say=lambda found, text: text,
     ),
     Check(
-        name="slack-left-out",
-        about="readings of slack cables were left out as asked",
-        levels=("remark",),
-        run=lambda found: _slack(found, left_out=True),
-        say=_slack_left_out,
+        name="slack-left-out", about="readings of slack cables were left out as asked",
+        levels=("remark",), run=lambda found: _slack(found, left_out=True), say=_slack_left_out,
     ),
     Check(
-        name="copies",
-        about="rows, or whole sets, equal others to the last digit",
-        at_once=True,
+        name="copies", about="rows, or whole sets, equal others to the last digit", at_once=True,
         run=lambda found: copies(found.fit.uncertainty.equations),
         say=lambda found, copied: str(copied),
     ),
     Check(
         name="slack-fitted",
         about="cables that the others show to be slack were fitted as if they were taut",
-        at_once=True,
-        run=lambda found: _slack(found, left_out=False),
+        at_once=True, run=lambda found: _slack(found, left_out=False),
         say=lambda found, cables: (
             f"cables read longer than the others allow, {listed_slack(cables)}: where they were"
             f" slack, {_SLACK} leaves these readings out"
         ),
         remedies=lambda found, cables: (_SLACK,),
     ),
-)
+)  # fmt: skip

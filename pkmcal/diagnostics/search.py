@@ -60,25 +60,19 @@ def _level_of_weak(found: Solution, weak: Weak) -> Level:
 
 CHECKS = (
     Check(
-        name="nothing-determined",
-        about="the measurements determine no number of the machine",
-        levels=("grave",),
-        run=lambda found: at_most_one(_nothing_determined(found) or None),
+        name="nothing-determined", about="the measurements determine no number of the machine",
+        levels=("grave",), run=lambda found: at_most_one(_nothing_determined(found) or None),
         say=lambda found, _: (
             "these measurements determine no number of the machine, which is unchanged"
         ),
     ),
     Check(
-        name="not-converged",
-        about="the least squares did not converge",
-        levels=("grave",),
-        at_once=True,
-        run=lambda found: () if found.converged else (found.evaluations,),
+        name="not-converged", about="the least squares did not converge", levels=("grave",),
+        at_once=True, run=lambda found: () if found.converged else (found.evaluations,),
         say=lambda found, _: "the least squares did not converge",
     ),
     Check(
-        name="at-bounds",
-        about="numbers ended at a bound",
+        name="at-bounds", about="numbers ended at a bound",
         run=lambda found: at_most_one(found.at_bounds or None),
         say=lambda found, names: (
             f"{listed(names)} ended at a bound: the fit would go further; widen the bound, or see"
@@ -87,38 +81,29 @@ CHECKS = (
         remedies=lambda found, names: (Remedy("bounds"),),
     ),
     Check(
-        name="too-few-rows",
-        about="one pose only, or no more equations than numbers",
-        at_once=True,
-        run=_too_few,
-        say=lambda found, text: text,
+        name="too-few-rows", about="one pose only, or no more equations than numbers", at_once=True,
+        run=_too_few, say=lambda found, text: text,
     ),
     Check(
         name="weak-combinations",
         about="combinations of numbers are so weak that the search kept what they had",
-        at_once=True,
-        run=lambda found: at_most_one(_kept(found) or None),
-        say=_kept_text,
+        at_once=True, run=lambda found: at_most_one(_kept(found) or None), say=_kept_text,
         remedies=lambda found, _: (Remedy("prior"),),
     ),
     Check(
         name="beyond-linear",
         about="numbers are so uncertain that the machine is not linear over their ±",
-        unless=("grave",),
-        levels=("doubt", "remark"),
-        run=_weak,
-        level_of=_level_of_weak,
+        unless=("grave",), levels=("doubt", "remark"), run=_weak, level_of=_level_of_weak,
         say=lambda found, weak: str(weak),
         remedies=lambda found, weak: (Remedy("fix", weak.names), Remedy("prior")),
     ),
     Check(
         name="uninformative-poses",
-        about="what was read at some poses determines these poses at most",
-        levels=("remark",),
+        about="what was read at some poses determines these poses at most", levels=("remark",),
         run=lambda found: at_most_one(found.idle or None),
         say=lambda found, count: (
             f"{count} {'poses say' if count > 1 else 'pose says'} nothing: what was read there"
             " determines the pose at most"
         ),
     ),
-)
+)  # fmt: skip

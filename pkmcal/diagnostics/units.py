@@ -195,9 +195,7 @@ def _unit_errors(found: Solution) -> list[str]:
 CHECKS = (
     Check(
         name="unit-errors",
-        about="measurements fit far better in other units, or with columns exchanged",
-        at_once=True,
-        run=_unit_errors,
-        say=lambda found, text: text,
+        about="measurements fit far better in other units, or with columns exchanged", at_once=True,
+        run=_unit_errors, say=lambda found, text: text,
     ),
-)
+)  # fmt: skip

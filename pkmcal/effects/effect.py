@@ -7,7 +7,7 @@ object with the members of `Effect`; `identify(effects=[...])` takes it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
 from pkmcal.arrays import FloatArray, IntArray
@@ -62,3 +62,13 @@ class Effect(Protocol):
 
     def dependences(self, measured: Any) -> Iterator[Dependence]:
         """Its coefficients: arguments whose names no reading and no other effect has."""
+
+
+class StatedEffect(Protocol):
+    """An effect that is stated of any machine, and asks the machine what it is there."""
+
+    def of_machine(self, machine: Any) -> Effect:
+        """The effect on this machine."""
+
+
+Effects = Effect | StatedEffect | Sequence[Effect | StatedEffect]

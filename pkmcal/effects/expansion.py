@@ -24,124 +24,71 @@ from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.readings.unknowns import Dependence
 
-Coefficients = float | Mapping[str, float] | None
 REFERENCE = 20.0  # °C
 _LARGEST = 1e-3  # 1/K: no material; µm/m/K were meant
 _PARTS = ("base", "platform", "limbs")
 _LIMB = re.compile(r"limb([1-9][0-9]*)")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Expansion:
-    """How the numbers of a machine grow with temperature.
+    """Thermal expansion, an effect that `identify` takes into account.
 
-    Attributes
+    With `Measurements.temperature` the numbers that are identified are those at 20 °C.
+
+    Parameters
     ----------
-    given : mapping of str to float
-        The coefficients as stated.
-    coefficient : ndarray (k,)
-        Of each number of its limbs, 1/K; 0 of angles.
-    column : ndarray of int (k,)
-        Which of the temperatures of a row it has.
-    platform : float
-        Of the platform, with the targets on it, 1/K.
+    coefficients : float or mapping of str to float
+        In 1/K, of steel 11.5e-6: one for all, or of "base", "platform" (with the targets on it),
+        "limbs" or single ones, "limb3"; parts that are not named do not grow.
+
+    Examples
+    --------
+    >>> Expansion({"base": 11.5e-6, "limb3": 23e-6})
+    Expansion(coefficients={'base': 1.15e-05, 'limb3': 2.3e-05})
     """
 
-    given: Mapping[str, float]
-    coefficient: FloatArray
-    column: IntArray
-    platform: float
-    name: ClassVar[str] = "expansion"
+    coefficients: float | Mapping[str, float]
 
-    def dependences(self, measured: Measurements) -> Iterator[Dependence]:
-        """None: its coefficients are exact."""
-        return iter(())
-
-    def of_rows(self, measured: Measurements) -> Growth:
-        """Relative growth of each number (N, k), and of places on the platform (N,).
+    def of_machine(self, machine: Calibratable) -> MachineExpansion:
+        """The coefficients of each number of a machine.
 
         Raises
         ------
-        ValueError
-            No temperature, or none of a part that grows.
+        ValueError, TypeError
+            An unknown part, no coefficient, a machine whose lengths are not among its numbers.
         """
-        if measured.temperature is None:
+        if not has_lengths(machine):
             raise ArgumentError(
-                "expansion: the measurements have no temperature; the file needs a column"
-                " temperature [°C]"
+                f"expansion: {machine.name} is an arm, or has limbs that are chains of joints or"
+                " drives with laws: which of their numbers are lengths is not known; found"
+                " coefficients"
             )
-        above = measured.temperature - REFERENCE
-        by_number = above[:, self.column]
-        by_number[:, self.coefficient == 0.0] = 0.0
-        platform = above[:, 1] if self.platform else np.zeros(len(above))
-        unread = np.isnan(by_number).any(axis=1) | np.isnan(platform)
-        if unread.any():
-            row = int(np.argmax(unread))
-            where = f"row {row}" if measured.lines is None else f"line {measured.lines[row]}"
-            file = f"{measured.file}, " if measured.file else ""
-            raise ArgumentError(f"expansion: {file}{where}: a temperature is missing")
-        return Growth(by_number * self.coefficient, platform * self.platform)
-
-
-@dataclass(frozen=True, eq=False)
-class Growth:
-    """Relative growth of each number (N, k), and of places on the platform (N,)."""
-
-    by_number: FloatArray
-    of_platform: FloatArray
-
-    def moved(
-        self,
-        machine: Any,
-        pose: FloatArray,
-        actuators: FloatArray,
-        rows: IntArray,
-        numbers: Mapping[str, FloatArray],
-    ) -> Moved:
-        """How the platform moves at poses (N, 6) of some rows."""
-        k = self.by_number.shape[1]
-        grown = machine.geometry.values[:k] * self.by_number[rows]
-        twists = machine.error_twists(pose, actuators)[..., :k]
-        twist = np.einsum("nij,nj->ni", twists, grown)
-        return Moved(twist, growth=self.of_platform[rows])
-
-
-def expansion_of(robot: Calibratable, given: Coefficients) -> Expansion | None:
-    """The coefficients that `identify` was given, of the numbers of a machine.
-
-    Raises
-    ------
-    ValueError, TypeError
-        An unknown part, no coefficient, a machine whose lengths are not among its numbers.
-    """
-    if given is None:
-        return None
-    if not has_lengths(robot):
-        raise ArgumentError(
-            f"expansion: {robot.name} is an arm, or has limbs that are chains of joints or drives"
-            " with laws: which of their numbers are lengths is not known; found coefficients"
-        )
-    limbs = robot.model.limbs
-    of = {name: _coefficient(name, value) for name, value in _named(given, len(limbs)).items()}
-    numbers = robot.geometry.numbers
-    coefficient, column = np.zeros(len(numbers)), np.zeros(len(numbers), dtype=np.intp)
-    for i, number in enumerate(numbers):
-        part = number.slot.partition(".")[0]
-        part = "base" if part.startswith("over") else part
-        if part in _PARTS:
-            coefficient[i], column[i] = of.get(part, 0.0), _PARTS.index(part)
-            continue
-        actuator = limbs[number.limb].actuator
-        scale = number.slot == "gain" and robot.actuator_units[actuator] == "mm"
-        if number.unit == "mm" or scale:
-            coefficient[i] = of.get(f"limb{number.limb + 1}", of.get("limbs", 0.0))
-            column[i] = 2 + actuator
-    return Expansion(of, coefficient, column, of.get("platform", 0.0))
+        limbs = machine.model.limbs
+        of = {
+            name: _coefficient(name, value)
+            for name, value in _named(self.coefficients, len(limbs)).items()
+        }
+        numbers = machine.geometry.numbers
+        coefficient, column = np.zeros(len(numbers)), np.zeros(len(numbers), dtype=np.intp)
+        for i, number in enumerate(numbers):
+            part = number.slot.partition(".")[0]
+            part = "base" if part.startswith("over") else part
+            if part in _PARTS:
+                coefficient[i], column[i] = of.get(part, 0.0), _PARTS.index(part)
+                continue
+            actuator = limbs[number.limb].actuator
+            scale = number.slot == "gain" and machine.actuator_units[actuator] == "mm"
+            if number.unit == "mm" or scale:
+                coefficient[i] = of.get(f"limb{number.limb + 1}", of.get("limbs", 0.0))
+                column[i] = 2 + actuator
+        return MachineExpansion(of, coefficient, column, of.get("platform", 0.0))
 
 
 def stated(effects: Sequence[object]) -> dict[str, float]:
     """The coefficients that were given, 1/K, by part; empty where the machine does not grow."""
-    return {k: v for each in effects if isinstance(each, Expansion) for k, v in each.given.items()}
+    expansions = [each for each in effects if isinstance(each, MachineExpansion)]
+    return {part: value for each in expansions for part, value in each.given.items()}
 
 
 def has_lengths(robot: Calibratable) -> TypeGuard[Robot]:
@@ -186,7 +133,11 @@ def in_words(sets: Sequence[Measurements], given: Mapping[str, float], robot: Ca
     low, high = between
     span = f"{low:.4g} to {high:.4g} °C" if low < high else f"{low:.4g} °C"
     if not given:
-        advice = "; --expansion (expansion=) states how it expands" if has_lengths(robot) else ""
+        advice = (
+            "; --expansion (effects=[pk.Expansion(…)]) states how it expands"
+            if has_lengths(robot)
+            else ""
+        )
         return f"the machine was at {span}, which is not taken into account{advice}"
     return (
         f"numbers are those at {REFERENCE:g} °C; the machine was at {span}, expansion:"

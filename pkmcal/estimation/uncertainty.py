@@ -196,7 +196,7 @@ class Uncertainty:
 
 
 @dataclass(frozen=True, eq=False)
-class Solution:
+class LinearModel:
     """A fit as a linear model: what its equations belong to, and its residuals."""
 
     labels: Labels
@@ -207,7 +207,7 @@ class Solution:
 def uncertainty(
     estimator: Estimator,
     estimate: Estimate,
-    solution: Solution,
+    solution: LinearModel,
     rule: CovarianceRule,
     classes: IntArray | None = None,
 ) -> Uncertainty:
@@ -217,7 +217,7 @@ def uncertainty(
     ----------
     estimator, estimate : Estimator, Estimate
         The fit.
-    solution : Solution
+    solution : LinearModel
         It as a linear model.
     rule : {"auto", "classical", "cluster"}
         That of `identify`.
@@ -255,7 +255,7 @@ def uncertainty(
     )
 
 
-def solved(estimator: Estimator, estimate: Estimate) -> Solution:
+def solved(estimator: Estimator, estimate: Estimate) -> LinearModel:
     """The linear model at an estimate."""
     named, state = labels(estimator.equations), estimate.state
     pseudo = PseudoResiduals(estimate.residual, 1.0, 1.0)
@@ -272,7 +272,7 @@ def solved(estimator: Estimator, estimate: Estimate) -> Solution:
         back = unit_basis(estimate.triangle, estimate.prior, state.determined.identifiable)
         design = estimate.change(back)
     fit = in_unit_basis(design, pseudo.residual, estimate.prior, back, named.pose, named.component)
-    return Solution(named, fit, pseudo)
+    return LinearModel(named, fit, pseudo)
 
 
 def _prior_residual(estimator: Estimator, estimate: Estimate) -> FloatArray:
@@ -280,7 +280,7 @@ def _prior_residual(estimator: Estimator, estimate: Estimate) -> FloatArray:
 
 
 def unlike_components(
-    estimator: Estimator, estimate: Estimate, solution: Solution
+    estimator: Estimator, estimate: Estimate, solution: LinearModel
 ) -> tuple[IntArray, list[FloatArray]] | None:
     """Whether components of a set without sigma have unlike variances.
 

@@ -12,7 +12,6 @@ criterion matrices, 1973); what is left has finite deviations, in frames that th
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
@@ -27,8 +26,7 @@ from pkmcal.kinematics.workspace import sample_poses
 from pkmcal.screw import from_pose
 from pkmcal.statistics.linear_fit import ROUNDING
 
-DatumRule = Literal["none", "auto"]
-DATUMS: tuple[DatumRule, ...] = ("none", "auto")
+DATUM = "datum"  # the word that `fix` takes for them
 
 _POSES, _SHARE = 60, 0.7  # at which twists are compared, and how far out
 _POINTS = ("target", "attachment", "anchor")  # what a reading depends on and a frame moves

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
-from pkmcal.arguments import shown
+from pkmcal.arguments import did_you_mean, shown
 from pkmcal.arrays import BoolArray
 from pkmcal.estimation.begin import estimator_at
 from pkmcal.estimation.equations import Equations
@@ -18,30 +18,44 @@ from pkmcal.estimation.fit_data import FitData
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.fitted.outliers import outliers
 
-Drop = Literal["outliers"] | Sequence[int] | None
-OUTLIERS = "outliers"
+Found = Literal["outliers", "slack"]
+Drop = Found | Sequence[int | Found] | None
+FOUND: tuple[Found, ...] = ("outliers", "slack")
+_WANTED = "'outliers', 'slack' or numbers of rows"
 
 
-def named_rows(drop: Drop, count: int) -> tuple[int, ...]:
-    """Row numbers that the user names, in order; none for "outliers".
+class LeftOut(NamedTuple):
+    """What is to be left out: rows by number, outliers, readings of slack cables."""
+
+    rows: tuple[int, ...]
+    outliers: bool
+    slack: bool
+
+
+def left_out(drop: Drop, count: int) -> LeftOut:
+    """What `drop` names of measurements of so many rows.
 
     Raises
     ------
     ValueError, TypeError
-        No row of the measurements.
+        No row of the measurements, no such word.
     """
-    if drop is None or drop == OUTLIERS:
-        return ()
-    if isinstance(drop, str) or not isinstance(drop, Iterable):
-        raise ArgumentTypeError(f"drop: 'outliers' or numbers of rows, found {shown(drop)}")
-    rows = set[int]()
-    for row in drop:
-        if isinstance(row, bool) or not isinstance(row, int | np.integer):
-            raise ArgumentTypeError(f"drop: rows are whole numbers, found {shown(row)}")
-        if not 0 <= row < count:
-            raise ArgumentError(f"drop: the measurements have rows 0 to {count - 1}, found {row}")
-        rows.add(int(row))
-    return tuple(sorted(rows))
+    if drop is not None and not isinstance(drop, str | Iterable):
+        raise ArgumentTypeError(f"drop: {_WANTED}, found {shown(drop)}")
+    rows, words = set[int](), set[str]()
+    for each in () if drop is None else (drop,) if isinstance(drop, str) else drop:
+        if isinstance(each, str):
+            if each not in FOUND:
+                near = did_you_mean(each, FOUND, listed=0)
+                raise ArgumentTypeError(f"drop: {_WANTED}, found {shown(each)}{near}")
+            words.add(each)
+        elif isinstance(each, bool) or not isinstance(each, int | np.integer):
+            raise ArgumentTypeError(f"drop: rows are whole numbers, found {shown(each)}")
+        elif not 0 <= each < count:
+            raise ArgumentError(f"drop: the measurements have rows 0 to {count - 1}, found {each}")
+        else:
+            rows.add(int(each))
+    return LeftOut(tuple(sorted(rows)), "outliers" in words, "slack" in words)
 
 
 def without(datasets: Sequence[FitData], rows: Sequence[int]) -> list[FitData]:

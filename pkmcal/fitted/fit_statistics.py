@@ -35,36 +35,36 @@ class ParameterTable:
 
     Attributes
     ----------
-    free : tuple[str, ...]
+    free : tuple of str
         Names (n,): numbers of the geometry, then of an unknown frame and unknown targets.
-    units : tuple[str, ...]
+    units : tuple of str
         Unit of each parameter: "mm", "rad" or "1" (a ratio).
-    values : FloatArray
+    values : ndarray
         Identified values (n,).
-    start : FloatArray
+    start : ndarray
         Values (n,) before the calibration.
-    stderr : FloatArray
+    stderr : ndarray
         Standard deviations (n,); inf where neither measurements nor prior determine.
 
         They know no bounds: for numbers `at_bounds` they are those without the bound.
-    parameter_dof : FloatArray
+    parameter_dof : ndarray
         Degrees of freedom (n,) of each `stderr`; inf where sigma says all, 0 where nothing.
-    interval95 : FloatArray
+    interval95 : ndarray
         Ends (n, 2) of intervals that hold the true value in 95 % of calibrations.
 
         By Student's t with `parameter_dof`: with few degrees of freedom much wider than twice
         `stderr`.
-    covariance : FloatArray
+    covariance : ndarray
         Covariance (n, n) with stderr² on its diagonal; NaN beside an infinite variance.
 
         By `covariance_rule`. Where it is "cluster", its rank is at most the number of poses: each
         number in it is right, its inverse is not.
-    correlation_matrix : FloatArray
+    correlation_matrix : ndarray
         Correlations (n, n) by the design; NaN beside parameters that are not determined.
 
         Those of equal independent errors at the poses that were measured: few poses show what
         each parameter's error is, not how the errors of two go together.
-    at_bounds : tuple[str, ...]
+    at_bounds : tuple of str
         Parameters that ended at a bound.
     covariance_rule : str
         How: "classical", or "cluster" where rows of a pose share errors or a loss is robust.
@@ -93,16 +93,16 @@ class Identifiability:
         Number of combinations that the measurements alone determine, without prior.
     gap : float
         Singular value of the last identifiable combination over the next; inf if none.
-    unidentifiable : tuple[str, ...]
+    unidentifiable : tuple of str
         Combinations that change no measured quantity, as "base1.x − platform1.x".
 
         They keep what they had, or follow the prior. Coefficients are in mm at the machine: an
         angle counts as its arc.
-    gauges : tuple[str, ...]
+    gauges : tuple of str
         What readings of actuators alone leave open by their nature, in words.
 
         Where the base stands, the common scale; these combinations are not in `unidentifiable`.
-    observability : dict[str, float]
+    observability : dict of str to float
         Indices O1 … O5 of the scaled Jacobian, over the identifiable combinations.
     """
 
@@ -125,21 +125,23 @@ class Misfit:
         Unweighted; r is the distance of the measured from the predicted point, of a pose that of
         its position.
     rms_before : float
-        The same of the nominal machine, unknown frame and targets aligned with the readings.
+        `rms` of the nominal machine, unknown frame and targets aligned with the readings.
     closure_rms : float
         How far the machine's own closures disagree at the poses found, mm of the actuators.
 
         NaN where poses follow from the actuators exactly: as many closures as free coordinates, and
         no `Measurements.actuator_sigma`.
     closure_rms_before : float
-        The same of the nominal machine.
+        `closure_rms` of the nominal machine.
+    closures : ndarray
+        How far off the worst closure at each pose is (K,), mm; NaN where they hold.
     actuator_noise : float
         Estimated deviation of what the actuators read, mm; NaN where it was stated.
     tension_noise : float
         Estimated deviation of what load cells read, N; NaN where it was stated.
     tension_rms : float
         How far tensions are off what load cells read, N; NaN where they are no unknowns.
-    redundancy : tuple[float, ...]
+    redundancy : tuple of float
         Degrees of freedom left in each set, then in load cells and closures if fitted.
 
         Equations less what poses and parameters took of them; a deviation estimated from r of them
@@ -150,29 +152,33 @@ class Misfit:
         χ² per degree of freedom: about 1 if the noise is as stated; NaN without sigma.
     dof : float
         Degrees of freedom: equations, those of the prior included, less parameters.
-    noise : tuple[float, ...]
+    noise : tuple of float
         Estimated deviation of each set of measurements, mm; NaN where sigma was given.
 
         That of residuals: what a reading has of its own and what its pose shares, the model's error
         included. NaN, too, where no equations are left to show it.
-    component_noise : tuple[tuple[float, ...], ...]
-        The same of each component, mm and rad.
+    component_noise : tuple of tuple of float
+        `noise` of each component, mm and rad.
 
         Components are told apart where the residuals call for it: lengths and angles, x y and z.
-    reading_noise : tuple[float, ...]
+    components : tuple of tuple of str
+        What was read of each set: x, y, z.
+    told_apart : bool
+        Whether components differ in their noise.
+    reading_noise : tuple of float
         What a single reading of each set has of its own, mm per coordinate.
-    pose_noise : tuple[float, ...]
+    pose_noise : tuple of float
         What rows of one pose share beside it, mm per coordinate: pose and model errors.
-    residuals : tuple[FloatArray, ...]
+    residuals : tuple of ndarray
         Measured less predicted (N, k) of the fitted rows of each set, mm and rad.
-    rows : IntArray
+    rows : ndarray of int
         Numbers of the fitted rows, counted through all sets from 0.
-    outliers : tuple[int, ...]
+    outliers : tuple of int
         Rows that the others contradict, numbered likewise.
     distances_before : Distances
         Rms, median and 95 % quantile of the nominal machine's distances to fitted points, mm.
     distances : Distances
-        The same of the calibrated machine, and its rms without `outliers`.
+        Those of the calibrated machine, and its rms without `outliers`.
     """
 
     rms: float

@@ -44,7 +44,8 @@ class HeldOut:
     holdout_rms_before, holdout_rms : float
         Root mean square distances with the start's parameters and with the estimate's.
     holdout_expected : float
-        What `rms` should be if noise and covariance are right; NaN where the noise is not known.
+        What `holdout_rms` should be if noise and covariance are right; NaN where the noise is not
+        known.
     holdout_unreached : str
         Rows that were left out because their forward kinematics failed, in words.
     holdout_off_before, holdout_off : ndarray (N,)
@@ -60,7 +61,7 @@ class HeldOut:
     holdout_later : Later or None
         The rows.
     holdout_end : Evaluation or None
-        They at the estimate, their own parameters found.
+        The rows at the estimate, their own parameters found.
     holdout_own : mapping of str to (float, float)
         These parameters, of sessions that were not fitted: value and standard deviation.
     holdout_spare : float
@@ -69,7 +70,7 @@ class HeldOut:
         Rows of other measurements that were left out as outliers; of those that were drawn, see
         `Identification.dropped`.
     holdout_dropped_names : str
-        The same by lines of files, poses and targets.
+        These rows by lines of files, poses and targets.
     holdout_drawn : bool
         Whether they are of the same measurements as the fitted points, drawn at random.
     """

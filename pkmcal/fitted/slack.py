@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
@@ -26,8 +25,6 @@ from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.kinematics.robot import Robot
 from pkmcal.statistics.robust_scale import median_ratio
 
-Slack = Literal["keep", "drop"]
-SLACK: tuple[Slack, ...] = ("keep", "drop")
 _LISTED = 3  # cables that a warning names
 _FALSE_ALARM = 0.01  # chance of calling any cable slack where all are taut
 _ROUNDS = 10  # of leaving cables out and fitting anew
@@ -206,14 +203,6 @@ def slack_cables(
         for cell in cells
     ]
     return tuple(sorted(cables, key=lambda each: (-each.longer, each.rows)))
-
-
-def said_slack(cables: Sequence[SlackCable]) -> str:
-    """Warn of slack cables that were fitted as if they were taut."""
-    return (
-        f"cables read longer than the others allow, {listed_slack(cables)}: where they were slack,"
-        " slack='drop' (--drop-slack) leaves these readings out"
-    )
 
 
 def listed_slack(cables: Sequence[SlackCable]) -> str:

@@ -18,74 +18,18 @@ from pkmcal.kinematics.robot import Robot
 from pkmcal.statistics.prior_test import PriorTest
 
 _NAMES = (  # of `to_dict`, in the order in which they are written
-    "verdict",
-    "robot",
-    "free",
-    "units",
-    "values",
-    "start",
-    "stderr",
-    "parameter_dof",
-    "interval95",
-    "covariance",
-    "covariance_rule",
-    "rank",
-    "gap",
-    "datum",
-    "expansion",
-    "unidentifiable",
-    "gauges",
-    "rms",
-    "rms_before",
-    "holdout_rms",
-    "holdout_rms_before",
-    "holdout_expected",
-    "holdout_contradicts",
-    "holdout_chance",
-    "holdout_outliers",
-    "holdout_unreached",
-    "holdout_off",
-    "holdout_off_before",
-    "closure_rms",
-    "closure_rms_before",
-    "chi2_per_dof",
-    "dof",
-    "noise",
-    "component_noise",
-    "reading_noise",
-    "pose_noise",
-    "actuator_noise",
-    "tension_noise",
-    "tension_rms",
-    "redundancy",
-    "idle",
-    "repeatability",
-    "lack_of_fit",
-    "lack_of_fit_chance",
-    "observability",
-    "residuals",
-    "rows",
-    "outliers",
-    "dropped",
-    "holdout_dropped",
-    "slack",
-    "distances_before",
-    "distances",
-    "holdout_distances_before",
-    "holdout_distances",
-    "at_bounds",
-    "converged",
-    "evaluations",
-    "history",
-    "moved",
-    "sessions",
-    "robots",
-    "holdout_parameters",
-    "law_tests",
-    "drift",
-    "measuring_order",
-    "warnings",
-)
+    "verdict", "robot", "free", "units", "values", "start", "stderr", "parameter_dof", "interval95",
+    "covariance", "covariance_rule", "rank", "gap", "datum", "expansion", "unidentifiable",
+    "gauges", "rms", "rms_before", "holdout_rms", "holdout_rms_before", "holdout_expected",
+    "holdout_contradicts", "holdout_chance", "holdout_outliers", "holdout_unreached", "holdout_off",
+    "holdout_off_before", "closure_rms", "closure_rms_before", "chi2_per_dof", "dof", "noise",
+    "component_noise", "reading_noise", "pose_noise", "actuator_noise", "tension_noise",
+    "tension_rms", "redundancy", "idle", "repeatability", "lack_of_fit", "lack_of_fit_chance",
+    "observability", "residuals", "rows", "outliers", "dropped", "holdout_dropped", "slack",
+    "distances_before", "distances", "holdout_distances_before", "holdout_distances", "at_bounds",
+    "converged", "evaluations", "history", "moved", "sessions", "robots", "holdout_parameters",
+    "law_tests", "drift", "measuring_order", "warnings",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -118,8 +62,8 @@ class Solution(ParameterTable, Identifiability, Misfit, Repeats, HeldOut):
     dropped_names : str
         These rows by lines of files, poses and targets.
     slack : tuple of SlackCable
-        Readings of cables that the others show to be slack, the longest first: left out, or with
-        ``slack="keep"`` fitted.
+        Readings of cables that the others show to be slack, the longest first: left out, or
+        fitted.
     """
 
     robot: Robot | SerialArm

@@ -47,7 +47,7 @@ class Measurements(Result):
         Actuator coordinates as commanded or read, mm or rad as the limbs say.
     values : (N, 6), (N, 3), (N, 2) or (N,) array
         What was measured, in mm and rad, in the base frame (or the instrument's, where
-        `identify` is given ``frame="unknown"``); see `kind`. NaN: not read there.
+        `identify` is given ``unknown="frame"``); see `kind`. NaN: not read there.
         One row is taken as it is: actuators (n,) with values (6,), (3,) or a number, and what else
         has one entry a row likewise.
     kind : str or Reading
@@ -233,7 +233,7 @@ class Measurements(Result):
             raise ArgumentError(
                 f"target: the places of {', '.join(self.target_names)} on the platform are not"
                 " known; give them as an array, or identify them with --target unknown"
-                ' (target="unknown")'
+                ' (unknown="target")'
             )
         return self.of_points(self.target)
 

@@ -27,7 +27,7 @@ class Tracker:
         rad.
     position : (float, float, float)
         Where it stands, mm, in the frame its points are given in: the base frame, or, where
-        `identify` is given ``frame="unknown"``, its own, where it stands at 0. Its vertical
+        `identify` is given ``unknown="frame"``, its own, where it stands at 0. Its vertical
         axis is that frame's z.
 
     Examples

@@ -89,7 +89,9 @@ def calibrated(name: str, datum: Any) -> pk.Identification:
     machine = as_machine(robot)
     true = with_errors(robot, list(machine.geometry.match(machine.model.free)), rng)
     readings = measured(true, actuators(name, POSES, 5), rng)
-    return pk.identify(robot, readings, frame="unknown", target="unknown", datum=datum)
+    return pk.identify(
+        robot, readings, unknown=["frame", "target"], fix=["datum"] if datum == "auto" else []
+    )
 
 
 @every
@@ -151,7 +153,7 @@ def test_a_machine_whose_held_numbers_are_right_is_found(name: str) -> None:
     names = [each for each in machine.geometry.match(machine.model.free) if each not in held]
     true = with_errors(robot, names, rng)
     readings = measured(true, actuators(name, POSES, 9), rng)
-    found = pk.identify(robot, readings, frame="unknown", target="unknown", datum="auto")
+    found = pk.identify(robot, readings, unknown=["frame", "target"], fix="datum")
     assert set(found.datum.names) == set(held)
     own = as_machine(true).geometry
     right = dict(zip(own.names, own.values, strict=True))
@@ -196,10 +198,10 @@ def test_what_is_known_needs_no_datum() -> None:
     readings = pk.Measurements(
         rows, values, "position", sigma=0.01, target=TARGETS, target_index=index
     )
-    assert pk.identify(robot, readings, datum="auto").datum.names == ()
-    by_frame = pk.identify(robot, readings, frame="unknown", datum="auto").datum
+    assert pk.identify(robot, readings, fix="datum").datum.names == ()
+    by_frame = pk.identify(robot, readings, unknown="frame", fix="datum").datum
     assert (by_frame.base, by_frame.platform, len(by_frame.names)) == (6, 0, 6)
-    by_target = pk.identify(robot, readings, target="unknown", datum="auto").datum
+    by_target = pk.identify(robot, readings, unknown="target", fix="datum").datum
     assert (by_target.base, by_target.platform, len(by_target.names)) == (0, 6, 6)
 
 
@@ -207,7 +209,7 @@ def test_too_few_poses_are_no_matter_of_frames() -> None:
     robot, rng = pk.load("hexapod"), np.random.default_rng(2)
     readings = measured(robot, actuators("hexapod", 4, 3), rng)
     with pytest.warns(pk.CalibrationWarning):
-        found = pk.identify(robot, readings, frame="unknown", target="unknown", datum="auto")
+        found = pk.identify(robot, readings, unknown=["frame", "target"], fix="datum")
     assert len(found.datum.names) == 12
     assert found.rank < len(found.free) and found.unidentifiable
     assert np.isinf(found.stderr).any()
@@ -216,7 +218,7 @@ def test_too_few_poses_are_no_matter_of_frames() -> None:
 def test_a_number_with_a_prior_or_bounds_is_not_held() -> None:
     robot, rng = pk.load("hexapod"), np.random.default_rng(2)
     readings = measured(robot, actuators("hexapod", 40, 3), rng)
-    both = {"frame": "unknown", "target": "unknown", "datum": "auto"}
+    both = {"unknown": ["frame", "target"], "fix": "datum"}
     held = pk.identify(robot, readings, **both, bounds={"base1.*": (-1e4, 1e4)}).datum
     assert len(held.names) == 12 and not [name for name in held.names if "base1." in name]
     tied = pk.identify(robot, readings, **both, prior={"base*": 0.1}).datum
@@ -226,7 +228,7 @@ def test_a_number_with_a_prior_or_bounds_is_not_held() -> None:
 def test_numbers_that_are_fixed_are_no_parameters() -> None:
     robot, rng = pk.load("hexapod"), np.random.default_rng(2)
     readings = measured(robot, actuators("hexapod", 30, 3), rng)
-    kinds = {"frame": "unknown", "target": "unknown"}
+    kinds = {"unknown": ["frame", "target"]}
     found = pk.identify(
         robot, readings, **kinds, free=["base*", "offset*"], fix=["base1.*", "base2.z"]
     )
@@ -237,7 +239,7 @@ def test_numbers_that_are_fixed_are_no_parameters() -> None:
     with pytest.raises(pk.ArgumentError, match="fix: no parameter is left free"):
         pk.identify(robot, readings, **kinds, free="base*", fix="base*")
     with pytest.raises(pk.ArgumentError, match="datum"):
-        pk.identify(robot, readings, **kinds, datum="3-2-1")
+        pk.identify(robot, readings, **kinds, fix=["datum"] if "3-2-1" == "auto" else [])
 
 
 def test_json_has_held_numbers_apart_from_the_parameters(run: Any, tmp_path: Path) -> None:
@@ -263,6 +265,6 @@ def test_a_datum_is_advised_where_frames_were_sought() -> None:
     with pytest.warns(pk.CalibrationWarning):
         known = pk.identify(robot, readings)
     with pytest.warns(pk.CalibrationWarning):
-        sought = pk.identify(robot, readings, frame="unknown")
+        sought = pk.identify(robot, readings, unknown="frame")
     assert known.unidentifiable and "--datum" not in str(known)
     assert sought.unidentifiable and "--datum auto" in str(sought)

@@ -124,4 +124,4 @@ def test_targets_that_are_found_along_and_a_single_one_are_not_tested(hexapod: p
     still = np.zeros(3)
     (one, *_), whole = read(hexapod, 3, still, together=False), read(hexapod, 3, still)
     assert displaced_target(pk.identify(hexapod, one).fit) is None
-    assert displaced_target(pk.identify(hexapod, whole, "offset*", target="unknown").fit) is None
+    assert displaced_target(pk.identify(hexapod, whole, "offset*", unknown="target").fit) is None

@@ -154,5 +154,5 @@ def test_growth_that_the_temperature_explains_is_no_drift(hexapod: pk.Robot) -> 
     )  # fmt: skip
     plain = of(hexapod, warm).drift
     assert plain is not None and plain.found and "from 20 to 30 °C" in str(plain)
-    allowed = of(hexapod, warm, expansion=11.5e-6).drift
+    allowed = of(hexapod, warm, effects=[pk.Expansion(11.5e-6)]).drift
     assert allowed is not None and not allowed.found

@@ -59,9 +59,9 @@ def test_the_numbers_are_those_at_20_degrees(warm: Any, hexapod: pk.Robot, known
     if not known:
         turn = Rotation.from_euler("ZYX", [0.7, -0.2, 0.1]).as_matrix()
         points = points @ turn.T + [100.0, 200.0, 300.0]
-        words = {"frame": "unknown", "target": "unknown"}
+        words = {"unknown": ["frame", "target"]}
     measured = pk.Measurements(q, points, target=TARGET if known else None, temperature=warmth)
-    found = pk.identify(hexapod, measured, FREE, expansion=COEFFICIENTS, **words)
+    found = pk.identify(hexapod, measured, FREE, effects=[pk.Expansion(COEFFICIENTS)], **words)
     assert found.rms < 1e-3  # mm: what is left is of second order
     for name in ("base2.x", *(f"offset{i}" for i in range(1, 7))):
         assert found.parameters[name]["value"] == pytest.approx(true.geometry[name], abs=2e-3)
@@ -73,10 +73,15 @@ def test_the_numbers_are_those_at_20_degrees(warm: Any, hexapod: pk.Robot, known
 def test_points_that_are_held_out_are_warm_too(warm: Any, hexapod: pk.Robot) -> None:
     _, q, warmth, points = warm
     measured = pk.Measurements(q, points, target=TARGET, temperature=warmth)
-    found = pk.identify(hexapod, measured, FREE, expansion=COEFFICIENTS, holdout=0.3)
+    found = pk.identify(hexapod, measured, FREE, effects=[pk.Expansion(COEFFICIENTS)], holdout=0.3)
     assert found.holdout_rms < 1e-3
     fit, later = measured.split(0.3)
-    assert pk.identify(hexapod, fit, FREE, expansion=COEFFICIENTS, holdout=later).holdout_rms < 1e-3
+    assert (
+        pk.identify(
+            hexapod, fit, FREE, effects=[pk.Expansion(COEFFICIENTS)], holdout=later
+        ).holdout_rms
+        < 1e-3
+    )
 
 
 def test_a_machine_that_grows_as_a_whole_has_larger_poses(hexapod: pk.Robot) -> None:
@@ -85,7 +90,7 @@ def test_a_machine_that_grows_as_a_whole_has_larger_poses(hexapod: pk.Robot) -> 
     q = hexapod.inverse(poses)
     larger = poses * [1 + 1e-4, 1 + 1e-4, 1 + 1e-4, 1, 1, 1]
     measured = pk.Measurements(q, larger, "pose", sigma=0.01, temperature=30.0)
-    found = pk.identify(hexapod, measured, "offset*", expansion=1e-5)
+    found = pk.identify(hexapod, measured, "offset*", effects=[pk.Expansion(1e-5)])
     np.testing.assert_allclose(found.values, hexapod.geometry.values[6::8], atol=1e-4)
 
 
@@ -98,7 +103,7 @@ def test_ties_and_angles_of_a_delta_grow_as_its_lengths_do() -> None:
     )
     q = robot.inverse(poses)
     measured = pk.Measurements(q, poses[:, :3] * (1 + 1e-4), sigma=0.01, temperature=30.0)
-    found = pk.identify(robot, measured, expansion=1e-5)
+    found = pk.identify(robot, measured, effects=[pk.Expansion(1e-5)])
     assert found.rms < 1e-4 and np.abs(found.values - found.start).max() < 1e-3
 
 
@@ -106,18 +111,18 @@ def test_what_does_not_go_with_expansion_is_refused(hexapod: pk.Robot) -> None:
     q = hexapod.inverse(hexapod_poses(hexapod, 10, np.random.default_rng(1)))
     measured = pk.Measurements(q, np.zeros((10, 3)))
     with pytest.raises(pk.ArgumentError, match=r"no temperature; the file needs a column"):
-        pk.identify(hexapod, measured, expansion=1e-5)
+        pk.identify(hexapod, measured, effects=[pk.Expansion(1e-5)])
     blank = dataclasses.replace(measured, temperature=np.full(10, np.nan), lines=np.arange(10) + 5)
     with pytest.raises(pk.ArgumentError, match=r"line 5: a temperature is missing"):
-        pk.identify(hexapod, blank, expansion=1e-5)
+        pk.identify(hexapod, blank, effects=[pk.Expansion(1e-5)])
     read = dataclasses.replace(measured, temperature=21.0)
     with pytest.raises(pk.ArgumentError, match=r"in 1/K, of steel 11.5e-6; found 11.5"):
-        pk.identify(hexapod, read, expansion=11.5)
+        pk.identify(hexapod, read, effects=[pk.Expansion(11.5)])
     with pytest.raises(pk.ArgumentError, match=r"in 1/K, of steel 11.5e-6; found 0.0115"):
-        pk.identify(hexapod, read, expansion=0.0115)
+        pk.identify(hexapod, read, effects=[pk.Expansion(0.0115)])
     with pytest.raises(pk.ArgumentError, match=r"limb1 to limb6; found 'limb7'"):
-        pk.identify(hexapod, read, expansion={"limb7": 1e-5})
+        pk.identify(hexapod, read, effects=[pk.Expansion({"limb7": 1e-5})])
     with pytest.raises(pk.ArgumentError, match=r"chains of joints"):
-        pk.identify(pk.load("tricept"), read.select([0]), expansion=1e-5)
+        pk.identify(pk.load("tricept"), read.select([0]), effects=[pk.Expansion(1e-5)])
     with pytest.raises(pk.ArgumentError, match=r"temperature must be a number or have shape"):
         pk.Measurements(q, np.zeros((10, 3)), temperature=np.zeros((10, 6)))

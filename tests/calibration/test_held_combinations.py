@@ -26,7 +26,7 @@ def level_fit(seed: int, error: float) -> tuple[Identification, dict[str, float]
     reached, frame = pk.screw.from_pose(true.forward(q).pose), pk.screw.from_pose(FRAME)
     seen = (frame @ reached @ [*TARGET, 1.0])[:, :3] + SIGMA * random.normal(size=(40, 3))
     data = pk.Measurements(q, seen, "position", sigma=SIGMA)
-    found = pk.identify(robot, data, ["offset*"], frame="unknown", target="unknown")
+    found = pk.identify(robot, data, ["offset*"], unknown=["frame", "target"])
     truth = {name: true.geometry[name] for name in names}
     axes = ("x", "y", "z", "alpha", "beta", "gamma")
     truth |= {f"frame.{axis}": value for axis, value in zip(axes, FRAME, strict=True)}

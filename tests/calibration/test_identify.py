@@ -198,7 +198,7 @@ def test_unknown_frame_and_targets_are_found(hexapod: Robot) -> None:
     measured = Measurements(
         q, seen + rng.normal(0, 0.01, seen.shape), sigma=0.01, target_index=index
     )
-    found = identify(hexapod, measured, free="offset*", frame="unknown", target="unknown")
+    found = identify(hexapod, measured, free="offset*", unknown=["frame", "target"])
     assert found.free[6:] == (
         *(f"frame.{axis}" for axis in ("x", "y", "z", "alpha", "beta", "gamma")),
         *(f"target{i}.{axis}" for i in (1, 2) for axis in "xyz"),
@@ -214,7 +214,7 @@ def test_pose_measurements_in_an_unknown_frame(hexapod: Robot) -> None:
     q = hexapod.inverse(hexapod_poses(hexapod, 12, rng))
     frame = np.array([-900.0, 100.0, 2000.0, 3.0, 0.2, -1.0])
     seen = predict("pose", true.forward(q).pose, frame=frame).values
-    found = identify(hexapod, Measurements(q, seen, "pose"), free="offset*", frame="unknown")
+    found = identify(hexapod, Measurements(q, seen, "pose"), free="offset*", unknown="frame")
     np.testing.assert_allclose(found.values[6:], frame, atol=1e-7)
     np.testing.assert_allclose(found.values[:6], [0.4, 0, 0, -0.3, 0, 0], atol=1e-7)
 

@@ -145,7 +145,7 @@ def test_a_frame_and_targets_are_found_along() -> None:
     true = erring(ARM)
     frame = pk.screw.from_pose([1500.0, -800.0, 300.0, 0.2, -0.3, 2.0])
     measured = tracked(true, coordinates(ARM, 60), frame, THREE, noise=0.0)
-    found = identify(ARM, measured, frame="unknown", target="unknown")
+    found = identify(ARM, measured, unknown=["frame", "target"])
     assert found.rms_before > 1.0
     assert found.rms < 1e-6
 
@@ -174,7 +174,7 @@ def test_rank_of_six_joints_with_unknown_frame_and_targets(
         target=np.array(targets),
         target_index=index,
     )
-    found = identify(ARM, measured, frame="unknown", target="unknown")
+    found = identify(ARM, measured, unknown=["frame", "target"])
     assert (found.rank, len(found.free)) == (rank, columns)
     assert len(found.unidentifiable) == columns - rank
     assert found.gap > 1e6
@@ -187,7 +187,7 @@ def test_arms_of_all_sorts_are_as_good_elsewhere_as_the_tracker(name: str) -> No
     frame = pk.screw.from_pose([1500.0, -800.0, 300.0, 0.2, -0.3, 2.0])
     fitted = tracked(true, coordinates(arm, 40), frame, THREE, noise)
     elsewhere = tracked(true, coordinates(arm, 41, seed=2), frame, THREE, noise)
-    found = identify(arm, fitted, frame="unknown", target="unknown", holdout=elsewhere)
+    found = identify(arm, fitted, unknown=["frame", "target"], holdout=elsewhere)
     assert found.chi2_per_dof == pytest.approx(1.0, abs=0.2)
     assert found.holdout_rms < 1.15 * noise * np.sqrt(3)  # what is left of a point is its noise
     # four of a revolute joint, two of a prismatic one, base and tool, the targets' triangle
@@ -246,7 +246,7 @@ def test_derivatives_of_what_is_read_are_those_of_differences(kind: str, framed:
 
 def test_the_result_is_an_arm_that_can_be_saved_and_sent(tmp_path: Path) -> None:
     measured = VirtualMachine(erring(ARM)).measure(coordinates(ARM, 40), target=TARGET)
-    found = identify(ARM, measured, free="joint[2-6].*", frame="unknown")  # which is joint 1's
+    found = identify(ARM, measured, free="joint[2-6].*", unknown="frame")  # which is joint 1's
     assert found.free[0] == "joint2.dx"
     assert not found.robot.joint_errors[0].any()
     for again in (pickle.loads(pickle.dumps(found.robot)), _saved(found.robot, tmp_path)):

@@ -67,7 +67,7 @@ def assert_found(found: pk.Identification, true: Robot, frame: list[float]) -> N
 @pytest.mark.parametrize("name", ["hexapod", "rbt-6t03p"])
 def test_an_unknown_target_far_from_where_it_is_said_to_be(name: str, frame: list[float]) -> None:
     robot, true, readings = logged(name, frame, "position")
-    found = identify(robot, readings, free="offset*", frame="unknown", target="unknown", prior=0.5)
+    found = identify(robot, readings, free="offset*", unknown=["frame", "target"], prior=0.5)
     assert_found(found, true, frame)
     np.testing.assert_allclose(found.values[-3:], TARGET, atol=0.3)
 
@@ -75,14 +75,14 @@ def test_an_unknown_target_far_from_where_it_is_said_to_be(name: str, frame: lis
 @every
 def test_poses(frame: list[float]) -> None:
     robot, true, readings = logged("hexapod", frame, "pose")
-    found = identify(robot, readings, free="offset*", frame="unknown")
+    found = identify(robot, readings, free="offset*", unknown="frame")
     assert found.rank == 12
     assert_found(found, true, frame)
 
 
 def test_heights_of_an_instrument_on_its_side() -> None:
     robot, _, readings = logged("hexapod", FRAMES["far and turned by 170 degrees"], "height")
-    found = identify(robot, readings, free="offset*", frame="unknown", prior=0.5)
+    found = identify(robot, readings, free="offset*", unknown="frame", prior=0.5)
     assert found.converged and found.rms < 1.5 * NOISE
 
 
@@ -94,7 +94,7 @@ def test_uncertainty_of_a_frame_is_the_scatter_of_calibrations() -> None:
     for _ in range(40):
         noise = readings.sigma * rng.normal(size=(60, 6))
         again = dataclasses.replace(readings, values=clean + noise)
-        found = identify(robot, again, free="offset*", frame="unknown")
+        found = identify(robot, again, free="offset*", unknown="frame")
         values.append(found.values[-6:])
     np.testing.assert_allclose(np.std(values, axis=0), found.stderr[-6:], rtol=0.4)
     assert np.corrcoef(np.array(values).T)[3, 5] == pytest.approx(
@@ -105,7 +105,7 @@ def test_uncertainty_of_a_frame_is_the_scatter_of_calibrations() -> None:
 def test_a_prior_of_the_frame_is_around_the_base() -> None:
     """As it is stated: then the frame's numbers count from zero."""
     robot, _, readings = logged("hexapod", [0.3, 0.0, 0.0, 0.0, 0.0, 0.0], "pose")
-    options = {"free": "offset*", "frame": "unknown"}
+    options = {"free": "offset*", "unknown": "frame"}
     loose = identify(robot, readings, prior={"frame.x": 1.0}, **options)
     assert loose.parameters["frame.x"]["value"] == pytest.approx(0.3, abs=0.02)
     with pytest.warns(CalibrationWarning, match="contradict the prior"):
@@ -145,7 +145,7 @@ def test_level_poses_leave_the_target_where_it_was_stated(name: str, tilt: float
         values = instruments.seen_points(np.array(FRAMES["upside down"]), points)[0]
         values += NOISE * rng.normal(size=values.shape)
         measured = Measurements(q, values, sigma=NOISE, target=stated)
-        found = identify(robot, measured, free="offset*", frame="unknown", target="unknown")
+        found = identify(robot, measured, free="offset*", unknown=["frame", "target"])
         assert np.abs(found.values[-3:] - stated).max() < 10.0 + 5.0 * np.ptp(at, axis=0).max()
         assert found.chi2_per_dof == pytest.approx(1.0, abs=5 * np.sqrt(2 / found.dof))
         sure = np.isfinite(found.stderr[:n])
@@ -167,7 +167,7 @@ def test_a_target_found_far_from_the_machine_is_named() -> None:
     at = robot.home + rng.uniform(-1, 1, (60, 6)) * [100, 100, 80, 0.1, 0.1, 0.1]
     points = instruments.points(at, np.array([4000.0, 0.0, 0.0]))[0]
     measured = Measurements(robot.inverse(at), points, sigma=0.1)
-    free = {"free": "offset*", "frame": "unknown", "target": "unknown"}
+    free = {"free": "offset*", "unknown": ["frame", "target"]}
     with pytest.warns(pk.CalibrationWarning, match="target 1 was found 4e\\+03 mm"):
         identify(robot, measured, **free)
     there = dataclasses.replace(measured, target=[3990.0, 0.0, 0.0])
@@ -181,7 +181,7 @@ def test_a_target_found_far_from_the_machine_in_one_session_is_named_with_it() -
         at = robot.home + rng.uniform(-1, 1, (60, 6)) * [100, 100, 80, 0.1, 0.1, 0.1]
         points = instruments.points(at, np.array(place))[0]
         sets.append(Measurements(robot.inverse(at), points, sigma=0.1, session=day))
-    options = {"target": "unknown", "per_session": "target*"}
+    options = {"unknown": "target", "per_session": "target*"}
     with warnings.catch_warnings(record=True) as heard:
         warnings.simplefilter("always")
         identify(robot, sets, "offset*", **options)
@@ -204,7 +204,7 @@ def test_the_frame_of_poses_in_a_plane_is_found_from_what_was_read_of_them(turne
     values[:, 5] = np.remainder(pose[:, 5] + turned + np.pi, 2 * np.pi) - np.pi
     values[:, 3:] = np.c_[np.zeros((30, 2)), values[:, 5]] + rng.normal(0, 1e-5, (30, 3))
     measured = Measurements(q, values, "pose", sigma=[0.01] * 3 + [1e-5] * 3)
-    found = identify(robot, measured, free="offset*", frame="unknown")
+    found = identify(robot, measured, free="offset*", unknown="frame")
     value = dict(zip(found.free, found.values.tolist(), strict=True))
     assert found.converged and found.rms < 0.03
     assert value["frame.x"] == pytest.approx(700.0, abs=1.0)

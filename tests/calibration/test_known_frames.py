@@ -22,7 +22,7 @@ def test_target_far_from_where_the_search_starts_is_found(name: str, size: float
     seen = (pk.screw.from_pose(pose) @ [*target, 1.0])[:, :3]
     seen += SIGMA * random.normal(size=seen.shape)
     data = pk.Measurements(q, seen, "position", sigma=SIGMA)
-    found = pk.identify(robot, data, ["offset1"], target="unknown")
+    found = pk.identify(robot, data, ["offset1"], unknown="target")
     assert found.verdict.state == "calibrated"
     np.testing.assert_allclose(found.values[-3:], target, atol=5 * SIGMA)
 
@@ -33,5 +33,5 @@ def test_rows_that_were_not_read_place_no_target() -> None:
     values = pose[:, :3] + [10.0, 20.0, 30.0]
     values[3] = np.nan
     data = pk.Measurements(robot.inverse(pose), values, "position", sigma=SIGMA)
-    found = pk.identify(robot, data, ["offset1"], target="unknown")
+    found = pk.identify(robot, data, ["offset1"], unknown="target")
     np.testing.assert_allclose(found.values[-3:], [10.0, 20.0, 30.0], atol=1e-6)

@@ -257,7 +257,7 @@ def test_no_equation_left_over_is_named_with_a_prior_that_leaves_the_frame_out(
     paper: Robot, points: Measurements
 ) -> None:
     three = points.select(slice(0, 3))
-    (text,) = said(paper, three, prior=0.5, frame="unknown", target="unknown")
+    (text,) = said(paper, three, prior=0.5, unknown=["frame", "target"])
     assert "9 equations for 9 identifiable combinations: no degrees of freedom are left" in text
 
 
@@ -273,7 +273,7 @@ def test_a_misreading_is_named_wherever_the_instrument_stands(
 ) -> None:
     values = instruments.seen_points(np.array([5e3, -8e3, 1e3, 2.9, 0.3, -2.8]), points.values)[0]
     wrong = dataclasses.replace(points, values=change(values))
-    texts = said(paper, wrong, prior=0.5, frame="unknown", target="unknown")
+    texts = said(paper, wrong, prior=0.5, unknown=["frame", "target"])
     assert any(words in text for text in texts)
 
 
@@ -325,8 +325,9 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"prior": -1}, "prior must be positive"),
     ({"prior": {"base*": 0}}, r"prior of base\* must be positive"),
     ({"loss": "hubr"}, "loss must be one of linear, huber, cauchy"),
-    ({"frame": "unkown"}, "frame must be .* did you mean 'unknown'"),
-    ({"target": ["known", "known"]}, "target: one word for each of 1 sets"),
+    ({"unknown": "frme"}, "unknown must be .* did you mean 'frame'"),
+    ({"unknown": {"frame": "unkown"}}, "frame must be .* did you mean 'unknown'"),
+    ({"unknown": {"target": ["known", "known"]}}, "target: one word for each of 1 sets"),
     ({"holdout": 1.5}, "holdout must be a fraction"),
     ({"bounds": {"base1.x": (295, 296)}}, "bounds of base1.x must enclose its present value 294.2"),
     ({"bounds": {"base1.x": 3}}, "bounds of base1.x must be"),
@@ -362,14 +363,14 @@ def test_measurements_of_another_machine_are_refused(points: Measurements) -> No
 
 def test_points_alone_have_no_attachment(paper: Robot, points: Measurements) -> None:
     with pytest.raises(ValueError, match="attachment: distances alone have one"):
-        identify(paper, points, attachment="unknown")
+        identify(paper, points, unknown="attachment")
 
 
 def test_distances_alone_have_no_frame(paper: Robot) -> None:
     q = paper.inverse(tilted_poses(paper, 5, np.random.default_rng(5)))
     far = VirtualMachine(paper).measure(q, kind="distance", target=[500, 0, 0])
     with pytest.raises(ValueError, match="distances do not depend on it"):
-        identify(paper, far, frame="unknown")
+        identify(paper, far, unknown="frame")
 
 
 def test_struts_exchanged_in_a_log_that_is_a_row_late_are_both_named(hexapod: pk.Robot) -> None:

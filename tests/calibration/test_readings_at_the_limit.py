@@ -257,7 +257,7 @@ def test_each_kind_reaches_the_cramer_rao_bound_and_is_honest(
         rng = np.random.default_rng(seed)
         true = with_errors(robot, SIGMA, rng)
         case = CASES[kind](true, rng, pk.VirtualMachine(true, NOISE, seed))
-        found = pk.identify(robot, case.measured, prior=SIGMA, target=case.target)
+        found = pk.identify(robot, case.measured, prior=SIGMA, unknown={"target": case.target})
         off = found.values - [
             case.truth[name] if name in case.truth else true.geometry[name] for name in found.free
         ]

@@ -207,7 +207,7 @@ def test_what_cannot_be_found_anew_is_refused(
 ) -> None:
     with pytest.raises((ValueError, TypeError), match=message):
         pk.identify(
-            hexapod, two[1], "offset*", frame="unknown",
+            hexapod, two[1], "offset*", unknown="frame",
             per_session=per_session,  # type: ignore[arg-type]
         )  # fmt: skip
 
@@ -251,8 +251,7 @@ def test_the_instrument_stood_elsewhere_each_time(hexapod: Robot, how: str) -> N
     free = [f"offset{i}" for i in range(1, 7)]
     found = pk.identify(
         hexapod.replace({n: true.geometry[n] for n in held}), unplaced, free[1:],
-        frame="unknown" if how == "session" else ["unknown"] * 3,
-        target="unknown",
+        unknown={"frame": "unknown" if how == "session" else ["unknown"] * 3, "target": "unknown"},
         per_session="frame*" if how == "session" else (),
     )  # fmt: skip
     frames = [[f"frame.{c}@{day}" for c in pk_pose()] for day in DAYS]
@@ -277,15 +276,17 @@ def test_one_word_for_all_frames_is_one_frame(hexapod: Robot) -> None:
     q = hexapod.inverse(hexapod_poses(hexapod, 20, rng))
     whole = seen_from(pk.VirtualMachine(hexapod, NOISE).measure(q), STANDS[0])
     sets = [whole.select(slice(0, 10)), whole.select(slice(10, 20))]
-    found = pk.identify(hexapod, sets, "offset1", frame="unknown")
+    found = pk.identify(hexapod, sets, "offset1", unknown="frame")
     assert found.free[1] == "frame.x" and len(found.free) == 7
-    apart = pk.identify(hexapod, sets, "offset1", frame=["unknown", "unknown"])
+    apart = pk.identify(hexapod, sets, "offset1", unknown={"frame": ["unknown", "unknown"]})
     assert apart.free[1] == "frame.x@1" and apart.free[7] == "frame.x@2" and len(apart.free) == 13
     one = pk.identify(hexapod, [sets[0], pk.VirtualMachine(hexapod).measure(q)], "offset1",
-                      frame=["unknown", "known"])  # fmt: skip
+                      unknown={"frame": ["unknown", "known"]})  # fmt: skip
     assert one.free[1] == "frame.x" and len(one.free) == 7
     with pytest.raises(ValueError, match="frame: one for each set, or per_session one for each"):
-        pk.identify(hexapod, sets, "offset1", frame=["unknown"] * 2, per_session="frame*")
+        pk.identify(
+            hexapod, sets, "offset1", unknown={"frame": ["unknown"] * 2}, per_session="frame*"
+        )
 
 
 def test_a_reflector_that_was_set_down_anew(hexapod: Robot) -> None:
@@ -298,7 +299,7 @@ def test_a_reflector_that_was_set_down_anew(hexapod: Robot) -> None:
         seen = pk.VirtualMachine(hexapod, NOISE, int(rng.integers(2**31))).measure(q, target=place)
         sets.append(dataclasses.replace(seen, session=day, target=[0.0, 0.0, 0.0]))
     for given in (sets, in_one(sets)):
-        found = pk.identify(hexapod, given, "offset1", target="unknown", per_session="target*")
+        found = pk.identify(hexapod, given, "offset1", unknown="target", per_session="target*")
         for day, place in zip(DAYS, places, strict=False):
             mine = [found.free.index(f"target1.{c}@{day}") for c in "xyz"]
             assert np.abs((found.values[mine] - place) / found.stderr[mine]).max() < 4.0
@@ -368,7 +369,7 @@ def test_its_frame_is_found_without_a_start_near_it(hexapod: Robot) -> None:
     near = hexapod.replace({"offset1": true.geometry["offset1"]})
     free = [f"offset{i}" for i in range(2, 7)]
     found = pk.identify(
-        near, sets[:2], free, frame="unknown", per_session="frame*", holdout=sets[2]
+        near, sets[:2], free, unknown="frame", per_session="frame*", holdout=sets[2]
     )
     own = found.holdout_parameters
     assert [*own] == [f"frame.{c}@friday" for c in pk_pose()]
@@ -391,7 +392,7 @@ def test_what_moved_is_told_beside_numbers_that_each_session_has_of_its_own(
     seen = pk.VirtualMachine(later, NOISE, 7).measure(q)
     held = seen_from(dataclasses.replace(seen, session="friday"), STANDS[2])
     found = pk.identify(
-        hexapod, sets[:2], "offset*", frame="unknown", per_session="frame*", holdout=held,
+        hexapod, sets[:2], "offset*", unknown="frame", per_session="frame*", holdout=held,
         prior=prior,
     )  # fmt: skip
     assert found.holdout_contradicts and found.moved

@@ -63,7 +63,7 @@ def fitted(
 ) -> pk.Identification:
     log = pk.Measurements(q, None, "closure", actuator_sigma=sigma)
     free = [name for name in FREE if int(name[4]) <= q.shape[1]]
-    return pk.identify(robot, log, free, fix=HELD, slack=slack)  # type: ignore[arg-type]
+    return pk.identify(robot, log, free, fix=HELD, drop="slack" if slack == "drop" else None)  # type: ignore[arg-type]
 
 
 def cells(found: pk.Identification) -> set[tuple[int, int]]:
@@ -146,7 +146,7 @@ def test_the_same_readings_are_left_out_where_a_datum_is_chosen(eight: pk.Robot)
     _, q, slack = drawn(CORNERS, 0, 40, 0.3)
     by_user = fitted(eight, q, "drop")
     log = pk.Measurements(q, None, "closure", actuator_sigma=NOISE)
-    chosen = pk.identify(eight, log, FREE, slack="drop", datum="auto")
+    chosen = pk.identify(eight, log, FREE, fix="datum", drop="slack")
     assert len(chosen.datum.names) == len(HELD)
     wanted = set(zip(*map(np.ndarray.tolist, np.nonzero(slack)), strict=True))
     assert cells(chosen) == cells(by_user) == wanted
@@ -195,7 +195,7 @@ def test_a_cable_is_slack_from_where_one_of_100_taut_machines_has_one(
         q = exact.copy()
         q[row, cable] += share * norm.isf(0.01 / q.size) * NOISE / np.sqrt(left)
         log = pk.Measurements(q, None, "closure", actuator_sigma=NOISE)
-        found = pk.identify(eight, log, ["base8.x"], slack="drop")
+        found = pk.identify(eight, log, ["base8.x"], drop="slack")
         assert cells(found) == ({(row, cable)} if share > 1.0 else set())
 
 
@@ -234,7 +234,7 @@ def test_readings_may_count_backwards_and_in_other_units(
     path.write_text(head + "".join(each))
     sigma = np.tile(NOISE / np.abs(gain), (len(q), 1))
     log = pk.Measurements(q / gain, None, "closure", actuator_sigma=sigma)
-    found = pk.identify(pk.load(path), log, FREE, fix=HELD, slack="drop")
+    found = pk.identify(pk.load(path), log, FREE, fix=HELD, drop="slack")
     plain = fitted(eight, q, "drop")
     assert len(plain.slack) == 6 and cells(found) == cells(plain)
     for one, other in zip(found.slack, plain.slack, strict=True):
@@ -251,7 +251,7 @@ def test_with_one_cable_more_than_needed_it_cannot_be_told_which(tmp_path: Path)
     q = np.linalg.norm(at[:, None] - corners, axis=2) + rng.normal(0, NOISE, (40, 4))
     q[11, 2] += 40.0
     log = pk.Measurements(q, None, "closure", actuator_sigma=NOISE)
-    found = pk.identify(robot, log, ["base4.x", "base4.y"], slack="drop")
+    found = pk.identify(robot, log, ["base4.x", "base4.y"], drop="slack")
     (cable,) = found.slack
     assert cable.rows == (11,) and 3 in cable.actuators and len(cable.actuators) > 1
     assert found.idle == 1
@@ -278,7 +278,7 @@ def test_the_slack_cable_is_among_those_named_where_others_would_do_as_well(
             q[row, cable] += rng.uniform(5, 60) / gain[cable]
         sigma = 0.2 / smaller / np.abs(gain)
         log = pk.Measurements(q, None, "closure", actuator_sigma=sigma)
-        found = pk.identify(robot, log, "offset*", slack="drop")
+        found = pk.identify(robot, log, "offset*", drop="slack")
         named = {row: each.actuators for each in found.slack for row in each.rows}
         assert named.keys() == loose.keys()
         for row, cable in loose.items():
@@ -295,7 +295,7 @@ def test_legs_that_push_are_never_slack(tmp_path: Path) -> None:
     _, q, _ = drawn(CORNERS, 6, 30, 0.1)
     log = pk.Measurements(q, None, "closure", actuator_sigma=NOISE)
     with pytest.warns(pk.CalibrationWarning):
-        found = pk.identify(pk.load(path), log, FREE, fix=HELD, slack="drop")
+        found = pk.identify(pk.load(path), log, FREE, fix=HELD, drop="slack")
     assert not found.slack
 
 

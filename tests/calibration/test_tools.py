@@ -74,8 +74,8 @@ def test_a_tool_is_found_without_a_start_near_it(
     true = hexapod.replace({"base1.x": hexapod.geometry["base1.x"] + 0.8, "offset2": 0.5})
     seen = carried(read(hexapod, true, 3), STANDS[0] if framed else None, tool)
     found = pk.identify(
-        hexapod, seen, ["base1.x", "offset2"], frame="unknown" if framed else "known",
-        target="unknown", holdout=0.2,
+        hexapod, seen, ["base1.x", "offset2"], holdout=0.2,
+        unknown=["frame", "target"] if framed else "target",
     )  # fmt: skip
     names = [f"tool.{c}" for c in ("x", "y", "z", "alpha", "beta", "gamma")]
     mine = [found.free.index(name) for name in names]
@@ -98,17 +98,17 @@ def test_one_tool_for_two_frames_or_one_a_session(hexapod: Robot) -> None:
         for k, (stand, day) in enumerate(zip(STANDS, ("monday", "thursday"), strict=True))
     ]
     common = pk.identify(
-        hexapod, sets, "offset1", frame="unknown", target="unknown", per_session="frame*"
+        hexapod, sets, "offset1", unknown=["frame", "target"], per_session="frame*"
     )
     assert len(common.free) == 1 + 12 + 6 and 0.6 < common.chi2_per_dof < 1.4
     each = pk.identify(
-        hexapod, sets, "offset1", frame="unknown", target="unknown",
+        hexapod, sets, "offset1", unknown=["frame", "target"],
         per_session=["frame*", "tool*"],
     )  # fmt: skip
     assert "tool.x@monday" in each.free and "tool.gamma@thursday" in each.free
     assert 0.6 < each.chi2_per_dof < 1.4
     held = pk.identify(
-        hexapod, sets[0], "offset1", frame="unknown", target="unknown", holdout=sets[1],
+        hexapod, sets[0], "offset1", unknown=["frame", "target"], holdout=sets[1],
         per_session="frame*",
     )  # fmt: skip
     assert len(held.holdout_parameters) == 6 and not held.holdout_contradicts

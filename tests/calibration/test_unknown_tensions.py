@@ -369,7 +369,7 @@ def test_what_cannot_be_is_refused_by_name() -> None:
     with pytest.raises(ArgumentError, match="holdout: rows whose tensions are unknown"):
         pk.identify(four(), rows(data, 2.0), ["base4.x"], holdout=0.25)
     with pytest.raises(ArgumentError, match=r"slack: .* tensions are unknown"):
-        pk.identify(four(), rows(data, 2.0), ["base4.x"], slack="drop")
+        pk.identify(four(), rows(data, 2.0), ["base4.x"], drop="slack")
     with pytest.raises(ArgumentError, match="plans know no load cells"):
         pk.plan_poses(four(), np.hstack([data["at"], 0 * data["at"]]), 8, actuator_noise=0.2)
     with pytest.raises(ArgumentError, match="state tension_sigma of all sets"):

@@ -282,7 +282,7 @@ def test_exchanged_targets_are_found() -> None:
     arm, _, measured = of_arm(30, 6)
     assert measured.target_index is not None
     index = np.array([1, 0, 2])[measured.target_index]
-    found = fitted(arm, replace(measured, target_index=index), frame="unknown")
+    found = fitted(arm, replace(measured, target_index=index), unknown="frame")
     assert found.verdict.state == "not calibrated"
     assert "if target 1 is 2, 2 is 1" in found.verdict.reasons[0]
 

@@ -195,14 +195,14 @@ def test_heights_of_a_planar_machine_calibrate_nothing(seed: int) -> None:
     q = robot.inverse(pk.sample_poses(robot, 60, seed=1))
     values = 10 + np.random.default_rng(seed).normal(0, 0.02, 60)
     measured = Measurements(q, values, "height", sigma=0.02, target=[30, -20, 10])
-    for options in ({"frame": "unknown"}, {"target": "unknown"}, {}):
+    for options in ({"unknown": "frame"}, {"unknown": "target"}, {}):
         try:
             verdict = fitted(robot, measured, **options).verdict
         except ValueError as error:
             assert not options and "depend on none of offset1" in str(error)
             continue
         assert verdict.state != "calibrated"
-        if "target" in options:
+        if options["unknown"] == "target":
             assert verdict.reasons[0].startswith("these measurements determine no number of the")
 
 
@@ -211,7 +211,7 @@ def test_deviations_that_the_machine_cannot_take_are_said_to_say_little() -> Non
     q = robot.inverse(pk.sample_poses(robot, 60, seed=1))
     values = 10 + np.random.default_rng(0).normal(0, 0.02, 60)
     measured = Measurements(q, values, "height", sigma=0.02, target=[30, -20, 10])
-    reasons = fitted(robot, measured, frame="unknown").verdict.reasons
+    reasons = fitted(robot, measured, unknown="frame").verdict.reasons
     assert "offset1 … offset3 are hardly determined: the machine could not even be" in reasons[0]
 
 

@@ -13,7 +13,7 @@ import typer
 import pkmcal as pk
 from pkmcal.calibration.identification import Identification
 from pkmcal.calibration.identify import identify
-from pkmcal.cli.verbs import app
+from pkmcal.cli.calibrate import calibrate
 from pkmcal.diagnostics.check import Check, Level, Remedy
 from pkmcal.diagnostics.checks import CHECKS
 from pkmcal.diagnostics.diagnosis import verified
@@ -108,7 +108,9 @@ def test_a_remedy_is_an_argument_of_identify_and_an_option_of_the_command_line(
     remedy: Remedy,
 ) -> None:
     assert remedy.argument in inspect.signature(identify).parameters
-    command = cast(Any, typer.main.get_command(app)).commands["calibrate"]
+    app = typer.Typer()
+    app.command()(calibrate)
+    command = cast(Any, typer.main.get_command(app))
     known = {option for parameter in command.params for option in parameter.opts}
     if remedy.option is not None:
         given = {word for word in remedy.option.split() if word.startswith("--")}

@@ -65,7 +65,7 @@ def test_a_base_moved_with_the_frame_is_named() -> None:
     rng = np.random.default_rng(7)
     poses = robot.home + rng.uniform(-1, 1, (30, 6)) * [100, 100, 80, 0.3, 0.3, 0.3]
     measured = VirtualMachine(robot).measure(robot.inverse(poses), kind="pose")
-    found = identify(robot, measured, free=["base*.x"], frame="unknown")
+    found = identify(robot, measured, free=["base*.x"], unknown="frame")
     assert found.rank == 11
     assert found.unidentifiable == ("base1.x + … + base6.x − frame.x",)
 
@@ -124,7 +124,7 @@ def test_no_combination_is_named_twice() -> None:
     robot = pk.load("3rps")
     q = robot.inverse(pk.sample_poses(robot, 40), match=True)
     measured = pk.VirtualMachine(robot, 0.01).measure(q)
-    found = pk.identify(robot, measured, frame="unknown", target="unknown")
+    found = pk.identify(robot, measured, unknown=["frame", "target"])
     open_ones = found.fit.estimate.state.measured.unidentifiable
     basis = sparse_basis(open_ones, found.free)
     basis /= np.linalg.norm(basis, axis=0)

@@ -22,7 +22,7 @@ def test_the_unknown_fixed_point_of_distances_is_found(hexapod: Robot) -> None:
     anchor = np.array([400.0, 300.0, -100.0])
     exact = VirtualMachine(true, noise=0).measure(q, kind="distance", target=anchor)
     rough = dataclasses.replace(exact, target=anchor + np.array([3.0, -4.0, 5.0]))
-    found = identify(hexapod, rough, free="offset2", target="unknown")
+    found = identify(hexapod, rough, free="offset2", unknown="target")
     assert found.free == ("offset2", "anchor1.x", "anchor1.y", "anchor1.z")
     np.testing.assert_allclose(found.values, [0.5, *anchor], atol=1e-6)
 
@@ -42,7 +42,7 @@ def test_wires_are_found_at_both_ends(hexapod: Robot) -> None:
         instrument=Distance(ends + rng.normal(0, 3, (6, 3))),
         target_index=index,
     )
-    found = identify(hexapod, rough, free="offset*", target="unknown", attachment="unknown")
+    found = identify(hexapod, rough, free="offset*", unknown=["target", "attachment"])
     assert found.free[6:9] == ("attachment1.x", "attachment1.y", "attachment1.z")
     assert found.free[24:27] == ("anchor1.x", "anchor1.y", "anchor1.z")
     truth = np.concatenate([[0, 0.5, 0, 0, -0.3, 0], ends.ravel(), anchors.ravel()])
@@ -61,7 +61,7 @@ def test_wires_may_be_held_out_with_both_ends_unknown(hexapod: Robot) -> None:
     anchor, end = np.array([400.0, 300.0, -100.0]), np.array([60.0, -40.0, 20.0])
     measured = VirtualMachine(hexapod, noise=0.02).measure(q, Distance(end), anchor)
     rough = dataclasses.replace(measured, target=anchor + 3.0, instrument=Distance(end - 2.0))
-    words = {"target": "unknown", "attachment": "unknown"}
+    words = {"unknown": ["target", "attachment"]}
     found = identify(hexapod, rough, free="offset2", prior=0.5, holdout=0.25, **words)
     assert found.free[1:] == tuple(
         f"{point}1.{axis}" for point in ("attachment", "anchor") for axis in "xyz"
@@ -75,6 +75,6 @@ def test_one_end_may_be_known_and_the_other_not(hexapod: Robot) -> None:
     anchor, end = np.array([400.0, 300.0, -100.0]), np.array([60.0, -40.0, 20.0])
     exact = VirtualMachine(hexapod, noise=0).measure(q, Distance(end), anchor)
     rough = dataclasses.replace(exact, instrument=Distance(end + np.array([3, -4, 5])))
-    found = identify(hexapod, rough, free="offset2", attachment="unknown")
+    found = identify(hexapod, rough, free="offset2", unknown="attachment")
     assert found.free == ("offset2", "attachment1.x", "attachment1.y", "attachment1.z")
     np.testing.assert_allclose(found.values, [0.0, *end], atol=1e-6)

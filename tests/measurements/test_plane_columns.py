@@ -105,6 +105,6 @@ def test_an_unknown_frame_is_laid_on_what_was_read() -> None:
     seen[20:25, 0] = np.nan
     seen[25:] = np.nan
     known = pk.Measurements(q, np.where(np.isnan(seen), np.nan, np.c_[xy, xy[:, :1]]))
-    found = pk.identify(SLED, pk.Measurements(q, seen), frame="unknown")
+    found = pk.identify(SLED, pk.Measurements(q, seen), unknown="frame")
     assert found.rms == pytest.approx(pk.identify(SLED, known).rms, rel=0.2)
     assert "frame.z" in found.unidentifiable

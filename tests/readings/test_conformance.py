@@ -97,7 +97,7 @@ def test_all_its_unknowns_are_found_from_nothing_as_well_as_is_said(case: Case) 
     robot = pk.load(case.machine)
     true = with_errors(robot, SIGMA, np.random.default_rng(1))
     measured = case.measured(true, ROWS, 1, NOISE)
-    found = pk.identify(robot, measured, prior=SIGMA, holdout=0.25, **case.unknown)
+    found = pk.identify(robot, measured, prior=SIGMA, holdout=0.25, unknown=case.unknown)
     known = [i for i, name in enumerate(found.free) if name in robot.geometry.names]
     off = found.values[known] - [true.geometry[found.free[i]] for i in known]
     covariance = found.covariance[np.ix_(known, known)]

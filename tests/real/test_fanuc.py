@@ -18,7 +18,7 @@ pytestmark = pytest.mark.skipif(
     not LOG.exists(), reason="the tracker log is not beside this checkout (../shared/data)"
 )
 
-UNKNOWN = {"frame": "unknown", "target": "unknown"}
+UNKNOWN = {"unknown": ["frame", "target"]}
 PRIOR = 1.0  # mm: what an arm's errors of manufacture are, more or less
 
 

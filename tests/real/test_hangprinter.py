@@ -108,12 +108,12 @@ def test_no_line_is_called_slack_until_one_is(
     """The lines of the log were taut; 40 mm more of one are found where a camera looked."""
     turned, seen = rows
     log = {"kind": "position", "sigma": 1.0, "actuator_sigma": 1.0}
-    taut = pk.identify(printer, pk.Measurements(turned, seen, **log), slack="drop")  # type: ignore[arg-type]
+    taut = pk.identify(printer, pk.Measurements(turned, seen, **log), drop="slack")  # type: ignore[arg-type]
     assert taut.slack == ()
     row = int(np.flatnonzero(np.isfinite(seen).all(axis=1))[2])
     loose = turned.copy()
     loose[row, 1] += 40.0 * 2  # of spools with two turns per length of line
-    found = pk.identify(printer, pk.Measurements(loose, seen, **log), slack="drop")  # type: ignore[arg-type]
+    found = pk.identify(printer, pk.Measurements(loose, seen, **log), drop="slack")  # type: ignore[arg-type]
     (line,) = found.slack
     assert line.rows == (row,) and line.actuators == (2,)
     np.testing.assert_allclose(found.values, taut.values, atol=0.25 * taut.stderr.max())

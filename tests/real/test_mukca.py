@@ -73,7 +73,7 @@ def test_with_nominal_numbers_and_a_fitted_tip_sockets_scatter_by_7_to_9_mm(
 ) -> None:
     still = {"joint1.dx": 1e-6}
     data = touches(rows, "ABCD", "")
-    found = pk.identify(arm, data, "joint1.dx", target="unknown", prior=still)
+    found = pk.identify(arm, data, "joint1.dx", unknown="target", prior=still)
     _, scatter = judged(found, rows)
     assert all(6.5 <= each <= 9.1 for each in scatter.values()), scatter
 
@@ -83,7 +83,7 @@ def test_one_placement_whose_sockets_are_50_mm_apart_calibrates_for_the_other(
     arm: pk.SerialArm, rows: dict[str, FloatArray], fitted: str, held: str
 ) -> None:
     """The distance of the other is not known to the fit: an arm that had shrunk would show it."""
-    found = pk.identify(arm, touches(rows, fitted, fitted), target="unknown")
+    found = pk.identify(arm, touches(rows, fitted, fitted), unknown="target")
     middle, scatter = judged(found, rows)
     distance = apart(middle, *held)
     print(f"{fitted}: {held} {distance:.3f} mm apart, scatter {scatter}")
@@ -96,7 +96,7 @@ def test_one_placement_whose_sockets_are_50_mm_apart_calibrates_for_the_other(
 def test_all_four_sockets_scatter_by_less_than_a_quarter_of_a_millimetre(
     arm: pk.SerialArm, rows: dict[str, FloatArray]
 ) -> None:
-    found = pk.identify(arm, touches(rows, "ABCD", "AB"), target="unknown")
+    found = pk.identify(arm, touches(rows, "ABCD", "AB"), unknown="target")
     middle, scatter = judged(found, rows)
     distance = apart(middle, "C", "D")
     print(f"C and D {distance:.3f} mm apart, scatter {scatter}")
@@ -108,7 +108,7 @@ def test_a_placement_that_is_held_out_finds_its_own_sockets_first(
     arm: pk.SerialArm, rows: dict[str, FloatArray]
 ) -> None:
     found = pk.identify(
-        arm, touches(rows, "AB", "AB"), target="unknown", holdout=touches(rows, "CD", "")
+        arm, touches(rows, "AB", "AB"), unknown="target", holdout=touches(rows, "CD", "")
     )
     _, scatter = judged(found, rows)
     of_both = [scatter["C"] ** 2 * len(rows["C"]), scatter["D"] ** 2 * len(rows["D"])]
@@ -121,5 +121,5 @@ def test_touches_alone_shrink_the_arm_and_it_is_said(
     arm: pk.SerialArm, rows: dict[str, FloatArray]
 ) -> None:
     with pytest.warns(pk.CalibrationWarning, match="touch_distances"):
-        found = pk.identify(arm, touches(rows, "ABCD", ""), target="unknown")
+        found = pk.identify(arm, touches(rows, "ABCD", ""), unknown="target")
     assert found.verdict.state != "calibrated"

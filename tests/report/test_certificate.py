@@ -190,7 +190,7 @@ def test_it_states_no_other_temperature_than_was_calibrated_with(
     q = robot.inverse(workspaces.poses("hexapod", 12, 1))
     values = robot.forward(q).pose[:, :3] + np.random.default_rng(1).normal(0, NOISE, (12, 3))
     measured = pk.Measurements(q, values, temperature=np.linspace(21.0, 22.0, 12))
-    found = pk.identify(robot, measured, free="offset*", expansion=11.5e-6)
+    found = pk.identify(robot, measured, free="offset*", effects=[pk.Expansion(11.5e-6)])
     (tmp_path / "stated.toml").write_text(f"[temperature]\n{text}\n", "utf-8")
     stated = certificate.read(tmp_path / "stated.toml")
     if message is None:

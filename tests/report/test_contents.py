@@ -58,7 +58,7 @@ def test_machine_is_as_far_off_as_expected_where_the_instrument_stands_anywhere(
     found = pk.identify(
         robot,
         pk.Measurements(q, values, sigma=0.02, target_index=index),
-        free=free, frame="unknown", target="unknown",
+        free=free, unknown=["frame", "target"],
     )  # fmt: skip
     assert instrument_identified(found)
 

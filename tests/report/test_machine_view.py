@@ -68,7 +68,7 @@ def test_vectors_of_a_tracker_somewhere_are_turned_into_the_base() -> None:
     frame = np.array([500.0, -300.0, 80.0, 0.3, -0.5, 1.1])  # the base as the tracker has it
     seen = measured.values @ rotation(frame[3:]).T + frame[:3]
     away = pk.Measurements(measured.actuators, seen, kind="position", target=TARGET)
-    found = pk.identify(HEXAPOD, away, free="offset*", frame="unknown")
+    found = pk.identify(HEXAPOD, away, free="offset*", unknown="frame")
     vectors = residual_vectors(found, found.fit.end)
     np.testing.assert_allclose(
         np.linalg.norm(vectors, axis=1), np.linalg.norm(found.residuals[0], axis=1), atol=1e-12

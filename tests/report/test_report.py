@@ -275,7 +275,7 @@ def test_names_of_others_stay_text(tmp_path: Path) -> None:
     text = "\n".join([",".join(heads), *(f"{row},{quoted}" for row in rows)])
     (tmp_path / "tracker.csv").write_text(text, encoding="utf-8")
     measured = pk.read_measurements(tmp_path / "tracker.csv", robot)
-    found = pk.identify(robot, measured, free="offset*", target="unknown")
+    found = pk.identify(robot, measured, free="offset*", unknown="target")
     assert any(HOSTILE in name for name in found.free)
     report.write(found, tmp_path, {HOSTILE: b""})
     seen = browser.dump(tmp_path / "report.html")

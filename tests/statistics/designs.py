@@ -16,7 +16,7 @@ from pkmcal.statistics.distributions import t_factor
 from pkmcal.statistics.linear_fit import LinearFit, linear_fit, numbered
 
 TARGETS = np.diag([100.0, 100.0, 100.0])
-UNKNOWN: dict[str, Any] = {"frame": "unknown", "target": "unknown"}
+UNKNOWN: dict[str, Any] = {"unknown": ["frame", "target"]}
 
 
 def six_joints() -> pk.SerialArm:

@@ -1,0 +1,74 @@
+"""Arguments of `identify`: several words in one, and the keywords of the version before."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Literal, cast
+
+from pkmcal.arguments import word, words
+from pkmcal.effects.effect import Effect
+from pkmcal.effects.expansion import Expansion
+from pkmcal.estimation.parameters import Known
+from pkmcal.exceptions import ArgumentError, ArgumentTypeError
+from pkmcal.fitted.datum import DATUM
+from pkmcal.kinematics.calibratable import Calibratable
+
+Role = Literal["frame", "target", "attachment"]
+ROLES: tuple[Role, ...] = ("frame", "target", "attachment")
+Unknown = Role | Sequence[Role] | Mapping[Role, Known | Sequence[Known]]
+
+EARLIER = ("frame", "target", "attachment", "datum", "expansion", "slack")
+
+
+def unknown_roles(unknown: Unknown) -> dict[str, Known | Sequence[Known]]:
+    """What is "known" or "unknown" of each set, by role."""
+    if not isinstance(unknown, Mapping):
+        unknown = dict.fromkeys(cast(Any, words("unknown", unknown)), "unknown")
+    known: dict[str, Known | Sequence[Known]] = dict.fromkeys(ROLES, "known")
+    return known | {word("unknown", role, ROLES): given for role, given in unknown.items()}
+
+
+def fixed_names(fix: str | Sequence[str]) -> tuple[tuple[str, ...], bool]:
+    """Names of numbers that are held, and whether those that define the frames are."""
+    names = words("fix", fix)
+    return tuple(name for name in names if name != DATUM), DATUM in names
+
+
+def effects_on(machine: Calibratable, effects: Any) -> tuple[Effect, ...]:
+    """Effects on this machine, each stated once."""
+    if isinstance(effects, str) or not isinstance(effects, Iterable):
+        effects = (effects,)
+    found: dict[str, Effect] = {}
+    for each in effects:
+        if not hasattr(each, "of_rows") and not hasattr(each, "of_machine"):
+            raise ArgumentTypeError(
+                f"effects: expected such as pk.Expansion(11.5e-6), found {each!r}"
+            )
+        effect = each.of_machine(machine) if hasattr(each, "of_machine") else each
+        if effect.name in found:
+            raise ArgumentError(f"effects: {effect.name} is stated more than once")
+        found[effect.name] = effect
+    return tuple(found.values())
+
+
+def now(before: dict[str, Any], others: dict[str, Any]) -> dict[str, Any]:
+    """Keywords of today for those of the version before."""
+    new: dict[str, Any] = {}
+    roles = {role: before[role] for role in ROLES if before.get(role, "known") != "known"}
+    if roles:
+        alone = all(given == "unknown" for given in roles.values())
+        new["unknown"] = roles if not alone else [*roles] if len(roles) > 1 else next(iter(roles))
+    if word("datum", before.get("datum", "none"), ("none", "auto")) == "auto":
+        new["fix"] = _beside(others.get("fix"), DATUM)
+    if word("slack", before.get("slack", "keep"), ("keep", "drop")) == "drop":
+        new["drop"] = _beside(others.get("drop"), "slack")
+    if before.get("expansion") is not None:
+        new["effects"] = [*others.get("effects", ()), Expansion(before["expansion"])]
+    return new
+
+
+def _beside(given: Any, one: str) -> Any:
+    """One more of what an argument takes several of."""
+    if given is None or (not isinstance(given, str) and not len(given)):
+        return one
+    return [given, one] if isinstance(given, str) else [*given, one]
