@@ -270,7 +270,13 @@ def bench_100_belts(report: Report, error: float) -> None:
         made = begin()
         units, n = len(made.equations.components), len(made.scale)
         loss = Loss("linear", made.equations.components, np.ones(units))
-        given = np.zeros(n), np.ones(len(made.unstated)), loss, np.empty((0, n))
+        given = (
+            made.search.begin(),
+            np.zeros(n),
+            np.ones(len(made.unstated)),
+            loss,
+            np.empty((0, n)),
+        )
         return lambda: made.search.best(*given)
 
     plain = PlainBelts(robot, log, begin().start.pose)

@@ -40,11 +40,16 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.controllers.import_printer import import_printer as import_printer
     from pkmcal.core.swarm import CONSTRICTION as CONSTRICTION
     from pkmcal.core.swarm import SwarmSettings as SwarmSettings
+    from pkmcal.diagnostics.check import Check as Check
+    from pkmcal.diagnostics.check import Remedy as Remedy
+    from pkmcal.diagnostics.check import Said as Said
+    from pkmcal.diagnostics.checks import CHECKS as CHECKS
     from pkmcal.diagnostics.drift import Drift as Drift
     from pkmcal.diagnostics.law_tests import LawTest as LawTest
     from pkmcal.diagnostics.measuring_order import MeasuringOrder as MeasuringOrder
     from pkmcal.diagnostics.moved import Moved as Moved
     from pkmcal.diagnostics.verdict import Verdict as Verdict
+    from pkmcal.diagnostics.verdict import diagnose as diagnose
     from pkmcal.error_model.allocation import Allocation as Allocation
     from pkmcal.error_model.allocation import allocate_tolerance as allocate_tolerance
     from pkmcal.error_model.sensitivity import Sensitivity as Sensitivity
@@ -97,17 +102,19 @@ _HOMES = {
     "arms.inverse": ("ArmInverse",),
     "calibration.anchors": ("LocatedAnchors", "locate_anchors"),
     "calibration.bootstrap": ("Bootstrap", "bootstrap"),
-    "calibration.datum": ("Datum",),
+    "fitted.datum": ("Datum",),
     "fitted.distances": ("Distances",),
-    "calibration.drift": ("Drift",),
+    "diagnostics.check": ("Check", "Remedy", "Said"),
+    "diagnostics.checks": ("CHECKS",),
+    "diagnostics.drift": ("Drift",),
     "calibration.identification": ("Identification",),
     "calibration.identify": ("identify",),
-    "calibration.law_tests": ("LawTest",),
-    "calibration.measuring_order": ("MeasuringOrder",),
-    "calibration.moved": ("Moved",),
+    "diagnostics.law_tests": ("LawTest",),
+    "diagnostics.measuring_order": ("MeasuringOrder",),
+    "diagnostics.moved": ("Moved",),
     "planning.plan_poses": ("Plan", "plan_poses"),
-    "calibration.slack": ("SlackCable",),
-    "calibration.verdict": ("Verdict",),
+    "fitted.slack": ("SlackCable",),
+    "diagnostics.verdict": ("Verdict", "diagnose"),
     "checks.check_geometry": ("GeometryCheck", "check_geometry"),
     "checks.finding": ("Finding",),
     "compensation.compensate": ("Compensation", "compensate"),

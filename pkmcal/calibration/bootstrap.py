@@ -27,6 +27,7 @@ from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.labels import labels
 from pkmcal.estimation.least_squares import Search
+from pkmcal.estimation.redrawn import redrawn
 from pkmcal.exceptions import ArgumentError
 from pkmcal.fitted.fit import Fit
 from pkmcal.result import Result
@@ -213,14 +214,18 @@ class Replicate:
         left = signs[self._pose] * self._left
         drawn, _ = equations.parameters.off_functions(at.theta)
         drawn = drawn + random.standard_normal(len(drawn))
-        return self._solved(*equations.redrawn(at, self._estimate.state.noise, left, centre, drawn))
+        return self._solved(
+            *redrawn(equations, at, self._estimate.state.noise, left, centre, drawn)
+        )
 
     def _solved(self, equations: Equations, at: Evaluation) -> FloatArray:
         state = self._estimate.state
         search = Search(equations, at)
         kept = state.fitted.unidentifiable
         pins = state.fitted.singular[0] * kept.T
-        u = search.best(np.zeros(len(at.theta)), state.noise, state.loss, pins)
+        u, trail = search.best(
+            search.begin(), np.zeros(len(at.theta)), state.noise, state.loss, pins
+        )
         theta = at.theta + search.scale * (u - kept @ (kept.T @ u))
         found = equations.parameters.reported(theta)
-        return found if search.converged else np.full_like(found, np.nan)
+        return found if trail.converged else np.full_like(found, np.nan)

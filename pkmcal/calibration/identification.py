@@ -16,16 +16,15 @@ from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray, as_rows, propagate
 from pkmcal.calibration import summary
 from pkmcal.core import instruments
-from pkmcal.diagnostics.displaced import displaced_target
-from pkmcal.diagnostics.drift import Drift, drift
+from pkmcal.diagnostics.checks import AT_ONCE, CHECKS
+from pkmcal.diagnostics.diagnosis import Diagnosis
+from pkmcal.diagnostics.drift import Drift
 from pkmcal.diagnostics.law_tests import LawTest, law_tests
-from pkmcal.diagnostics.measuring_order import MeasuringOrder, measuring_order
-from pkmcal.diagnostics.moved import Moved, moved
-from pkmcal.diagnostics.robust_check import robust_check
-from pkmcal.diagnostics.verdict import Verdict, judge
+from pkmcal.diagnostics.measuring_order import MeasuringOrder
+from pkmcal.diagnostics.moved import Moved
+from pkmcal.diagnostics.verdict import Verdict, diagnose
 from pkmcal.display import Table
 from pkmcal.effects.expansion import in_words
-from pkmcal.estimation.estimator import FEW
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.fitted.row_names import row_names
 from pkmcal.fitted.solution import Solution
@@ -48,39 +47,48 @@ class Identification(Solution, Result):
     """
 
     @cached_property
+    def _findings(self) -> dict[str, tuple[Any, ...]]:
+        """What checks found, by their names: each is made once, when somebody asks."""
+        return {}
+
+    @cached_property
+    def warnings(self) -> tuple[str, ...]:
+        """What `identify` warned of: what looks wrong with measurements or result."""
+        return tuple(each.text for each in Diagnosis(self, AT_ONCE, self._findings).said())
+
+    @cached_property
     def verdict(self) -> Verdict:
         """Whether the result can be believed: state, reasons and remarks.
 
         A robust fit is made beside a linear one where some rows seem to carry it, and what moved is
         looked for where held-out points contradict the fit.
         """
-        robust = robust_check(self.fit) if self.loss == "linear" else None
-        displaced = displaced_target(self.fit)
-        return judge(self, robust, self.moved, self.drift, self.measuring_order, displaced)
+        return diagnose(self, CHECKS, self._findings)
 
-    @cached_property
+    def _finding(self, check: str) -> Any:
+        """The finding of a check; None where it has none."""
+        return next(iter(Diagnosis(self, CHECKS, self._findings).findings(check)), None)
+
+    @property
     def moved(self) -> tuple[Moved, ...]:
         """What moved between the fitted measurements and others that were held out.
 
         Empty where nothing did: where the points held out were drawn from the same measurements,
         and where they do not contradict a fit of several spare equations.
         """
-        later, end = self.holdout_later, self.holdout_end
-        if not self.holdout_contradicts and self.fit.uncertainty.fit.freedom >= FEW:
-            return ()
-        if self.holdout_drawn or later is None or end is None or not self.fit.uncertainty.known:
-            return ()
-        return moved(self.fit, later, end)
+        return self._finding("moved") or ()
 
-    @cached_property
+    @property
     def drift(self) -> Drift | None:
         """Whether repeated poses moved with time; None where too few were repeated to say."""
-        return drift(self.fit, self, {*self.outliers, *self.holdout_outliers})
+        found: Drift | None = self._finding("drift")
+        return found
 
-    @cached_property
+    @property
     def measuring_order(self) -> MeasuringOrder | None:
         """Whether residuals follow the order of measuring; None where too few can say."""
-        return measuring_order(self.fit, self.outliers)
+        found: MeasuringOrder | None = self._finding("measuring-order")
+        return found
 
     @cached_property
     def law_tests(self) -> tuple[LawTest, ...]:

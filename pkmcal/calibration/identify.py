@@ -3,70 +3,42 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
-from dataclasses import replace
+from collections.abc import Sequence
 from typing import Any
-
-import numpy as np
 
 from pkmcal.arguments import word, words
 from pkmcal.arms.arm import SerialArm
 from pkmcal.calibration.identification import Identification
-from pkmcal.diagnostics.plausibility import (
-    beyond_strokes,
-    contradicted_prior,
-    distant_points,
-    implausible_changes,
-    insufficient_data,
-    likely_unit_errors,
-    shrunk,
+from pkmcal.calibration.steps import (
+    begin,
+    compare,
+    judged,
+    prepare,
+    result,
+    solve,
+    with_component_noise,
+    with_datum,
+    without_outliers,
+    without_slack,
 )
 from pkmcal.diagnostics.row_errors import likely_mistakes
 from pkmcal.effects.expansion import Coefficients, expansion_of
-from pkmcal.estimation.begin import begun, estimator_at
-from pkmcal.estimation.datasets import as_fit_data, as_fitted, by_set, informative
-from pkmcal.estimation.equations import Equations
-from pkmcal.estimation.estimate import Estimate
-from pkmcal.estimation.estimator import LEAST_FREEDOM, Estimator
-from pkmcal.estimation.evaluation import Evaluation
-from pkmcal.estimation.fit_data import FitData
+from pkmcal.estimation.datasets import as_fit_data, by_set
 from pkmcal.estimation.free_parameters import parameters
 from pkmcal.estimation.loss import LIMITS, LossName
-from pkmcal.estimation.mode_slips import in_other_modes
 from pkmcal.estimation.parameters import Asked, Bounds, Known, Prior
-from pkmcal.estimation.set_noise import unlike_noise
-from pkmcal.estimation.starts import known_distances
-from pkmcal.estimation.uncertainty import Uncertainty, solved, uncertainty, unlike_components
 from pkmcal.exceptions import ArgumentError, CalibrationWarning
-from pkmcal.fitted.datum import DATUMS, NO_DATUM, DatumRule
-from pkmcal.fitted.datum import datum as choose_datum
+from pkmcal.fitted.datum import DATUMS, DatumRule
 from pkmcal.fitted.dropped import (
     OUTLIERS,
     Drop,
-    held_without,
     named_rows,
-    robust_outliers,
-    without,
 )
-from pkmcal.fitted.fit import Fit
-from pkmcal.fitted.fit_statistics import (
-    identifiability,
-    misfit,
-    parameter_table,
-    repeats,
-    tested_prior,
-)
-from pkmcal.fitted.holdout import HeldOut, draw, evaluate
-from pkmcal.fitted.row_names import row_names
-from pkmcal.fitted.slack import SLACK, Cell, Slack, said_slack, slack_cables, taut
-from pkmcal.kinematics.calibratable import as_given, as_machine
+from pkmcal.fitted.slack import SLACK, Slack
+from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.statistics.covariance import RULES, CovarianceRule
-
-_POOR = 0.1  # share of the misfit that a fit worth its name does not leave
-_NOISY = 9.0  # chi²/dof that a slip in sigma does not explain
 
 
 def identify(
@@ -203,221 +175,31 @@ def identify(
     asked = Asked(free, prior, bounds, anew, by_set(unknown), words("fix", fix))
     grows = expansion_of(machine, expansion)
     given = as_fit_data(machine, measurements, unknown, bool(anew), grows, tuple(effects))
-    dropped = named_rows(drop, sum(len(data.rows) for data in given))
-    datasets, unread = informative(machine, given)
-    held: list[tuple[FitData, int]] = []
-    if isinstance(holdout, Measurements):
-        held = [as_fitted(machine, holdout, datasets, sessions=bool(anew))]
-    elif holdout is not None:
-        pairs = [draw(data, holdout) for data in datasets]
-        datasets, held = [kept for kept, _ in pairs], [(out, i) for i, (_, out) in enumerate(pairs)]
-    datasets = without(datasets, dropped)
-    datasets += known_distances(datasets)
-    chosen = parameters(machine, datasets, asked)
+    named = named_rows(drop, sum(len(data.rows) for data in given))
+    rows = prepare(machine, given, holdout, named, bool(anew))
+    chosen = parameters(machine, rows.fitted, asked)
     word("loss", loss, LIMITS)
     word("covariance", covariance, RULES)
     word("datum", datum, DATUMS)
     word("slack", slack, SLACK)
-    equations, commanded, start = begun(datasets, chosen, unread)
-    if held and equations.closures.cells:
-        raise ArgumentError("holdout: rows whose tensions are unknown are all fitted: leave it out")
-    cells: tuple[Cell, ...] = ()
-    held_numbers = NO_DATUM
+    problem = begin(rows, chosen)
     try:
         if drop == OUTLIERS:
-            dropped = robust_outliers(equations, commanded, start)
-            datasets = without(datasets, dropped)
-            equations, commanded, start = begun(datasets, chosen, unread)
+            rows, problem = without_outliers(rows, problem, chosen)
         if slack == "drop":
-            equations, cells = taut(equations, commanded, start)
-            commanded = equations.with_exact_actuators() if cells else commanded
-        estimator = estimator_at(equations, commanded, start, loss)
-        estimate = estimator.solve()
+            problem = without_slack(problem)
+        fitted = solve(problem, loss)
         if datum == "auto":
-            held_numbers = choose_datum(estimator, estimate)
-        if held_numbers.names:
-            chosen = parameters(machine, datasets, held_numbers.asked(asked))
-            equations, commanded, start = begun(datasets, chosen, unread)
-            if cells:
-                keys = [(cell.pose, cell.closures[0]) for cell in cells]
-                equations = equations.without_closures(keys, estimate.evaluation)
-                commanded = equations.with_exact_actuators()
-            estimator = estimator_at(equations, commanded, start, loss)
-            estimate = estimator.solve()
+            fitted = with_datum(fitted, rows, asked)
     except ValueError as error:
-        hint = likely_mistakes(datasets, chosen, start)
-        if not hint and not start.ok:
+        hint = likely_mistakes(rows.fitted, chosen, problem.start)
+        if not hint and not problem.start.ok:
             hint = ["check units, signs and columns of their actuators, or leave these rows out"]
         raise ArgumentError("; ".join([f"measurements: {error}", *hint])) from None
-    solution = solved(estimator, estimate)
-    unlike = unlike_components(estimator, estimate, solution)
-    if unlike is not None:
-        again = Estimator(equations.reweighted(unlike[1]), estimator.start, loss)
-        try:
-            estimate = again.solve(estimate.evaluation)
-        except ArgumentError:  # grossly off: what there is says more than an error
-            unlike = None
-        else:
-            estimator, commanded = again, again.equations
-            solution = solved(estimator, estimate)
-    classes = None if unlike is None else unlike[0]
-    sure = uncertainty(estimator, estimate, solution, covariance, classes)
-    drawn = not isinstance(holdout, Measurements)
-    held = held_without(held, dropped) if drawn else held
-    outside = evaluate(held, estimator, estimate, sure)
-    if drop == OUTLIERS and outside.holdout_outliers and not outside.holdout_contradicts:
-        odd = outside.holdout_outliers
-        names = row_names(outside.holdout_data, odd)
-        outside = evaluate(held_without(held, odd), estimator, estimate, sure)
-        if drawn:
-            dropped = tuple(sorted({*dropped, *odd}))
-        else:
-            outside = replace(outside, holdout_dropped=odd, holdout_dropped_names=names)
-    result = _result(
-        estimator, estimate, commanded, start, replace(outside, holdout_drawn=drawn), sure
-    )
-    result = replace(
-        result,
-        datum=held_numbers,
-        dropped=dropped,
-        dropped_names=row_names(given, dropped),
-    )
-    if slack == "keep" and result.outliers:
-        with suppress(ArgumentError):  # a robust fit that does not come to an end says nothing
-            _, cells = taut(equations, commanded, start)
-    result = replace(result, slack=slack_cables(estimator.equations, estimate, cells))
-    notes = _warnings(result, estimator, estimate, datasets)
-    if slack == "keep" and result.slack:
-        notes.append(said_slack(result.slack))
-    for text in notes:
+    fitted = with_component_noise(fitted)
+    sure = judged(fitted, covariance)
+    rows, held = compare(rows, fitted, sure, outliers=drop == OUTLIERS)
+    found = result(rows, fitted, sure, held, find_slack=slack == "keep")
+    for text in found.warnings:
         warnings.warn(text, CalibrationWarning, stacklevel=2)
-    return replace(result, warnings=tuple(notes))
-
-
-def _warnings(
-    result: Identification, estimator: Estimator, estimate: Estimate, datasets: Sequence[FitData]
-) -> list[str]:
-    """Say what looks wrong with the measurements or the fit."""
-    fit = result.fit
-    equations, size = fit.equations, estimator.start.robot.length
-    notes = implausible_changes(estimator.start, estimate.evaluation, equations.parameters)
-    if notes or result.rms > _POOR * result.rms_before or result.chi2_per_dof > _NOISY:
-        notes = likely_unit_errors(datasets, equations.parameters, fit.start) or notes
-    notes += insufficient_data(
-        estimator.equations, result.rank, result.dof, bool(len(estimate.prior))
-    )
-    scale = float(np.sqrt(result.chi2_per_dof))
-    if estimator.loss != "linear" and equations.sigma_stated:
-        # of pseudo-residuals: rows that are weighed down say nothing about sigma
-        scale = fit.uncertainty.covariance.scale
-    if scale**2 > _NOISY:
-        notes.append(f"residuals are {scale:.3g} times what sigma says: {_remedy(result)}")
-    notes += in_other_modes(equations, fit.end)
-    notes += contradicted_prior(result.prior_test, equations.parameters, bool(result.outliers))
-    notes += distant_points(fit.end, equations.parameters)
-    notes += shrunk(equations, fit.start, fit.end)
-    notes += unlike_noise(equations, fit.uncertainty.slips, bool(result.outliers))
-    notes += beyond_strokes(equations, fit.start, fit.end)
-    unknown = fit.uncertainty.unknown
-    if fit.uncertainty.mixed and unknown.any():
-        names = [f"of measurements {i + 1}" for i in range(len(equations.sets))]
-        names += ["of the load cells"] if equations.closures.cells else []
-        names = [n for n, u in zip([*names, "of the actuators"], unknown, strict=True) if u]
-        cells = equations.closures.cells
-        sigmas = "sigma, actuator_sigma and tension_sigma" if cells else "sigma and actuator_sigma"
-        notes.append(
-            f"too little is left over to estimate the noise {' and '.join(names)}: state {sigmas}"
-        )
-    kept = estimate.state.determined.rank - estimate.state.fitted.rank
-    if kept:
-        which = "combinations of parameters are" if kept > 1 else "combination of parameters is"
-        worst = estimate.state.worst
-        why = "the machine's size" if worst == size else "and the search did not end with them"
-        notes.append(
-            f"{kept} {which} determined to no better than {worst:.3g} mm, {why}, and"
-            " kept as before: state a prior or measure more poses"
-        )
-    if not result.converged:
-        notes.append("the least squares did not converge: the result is not to be trusted")
-    if result.holdout_unreached:
-        notes.append(f"holdout: {result.holdout_unreached}; left out")
-    if result.holdout_spare < LEAST_FREEDOM:
-        notes.append(
-            f"holdout: {len(result.holdout_own)} numbers of its own session take all of its"
-            " readings, nothing is left to compare; hold out more rows of it"
-        )
-    return notes
-
-
-def _remedy(result: Identification) -> str:
-    """Advise on residuals far above sigma; repeats decide between its two causes."""
-    scatter = result.fit.uncertainty.repeats().scatter
-    if scatter**2 > _NOISY:
-        cause = f"repeats of a pose scatter {scatter:.3g} times as much as it"
-        first = ": look at the outliers; without any," if result.outliers else ","
-        return f"{cause}{first} state the true sigma"
-    cure = "free more parameters"
-    if not np.isfinite(scatter):
-        cure += ", or state the true sigma"
-    if result.outliers:
-        robust = "" if result.loss == "cauchy" else " fit with --loss cauchy (loss='cauchy'),"
-        cure = f"look at the outliers,{robust} or {cure}"
-    return cure
-
-
-def _result(
-    estimator: Estimator,
-    estimate: Estimate,
-    commanded: Equations,
-    start: Evaluation,
-    held: HeldOut,
-    sure: Uncertainty,
-) -> Identification:
-    chosen, search = estimator.equations.parameters, estimator.search
-    end = estimate.evaluation
-    robots = _robots(commanded, end)
-    if commanded is not estimator.equations:
-        commanded = commanded.with_tension(end.states.tension)
-        end = commanded.at(end.theta, near=end)
-    return Identification(
-        **vars(parameter_table(estimator, estimate, sure)),
-        **vars(identifiability(estimator, estimate)),
-        **vars(misfit(estimator, estimate, sure, (start, end))),
-        **vars(repeats(sure)),
-        **vars(held),
-        converged=search.converged,
-        evaluations=search.evaluations,
-        history=tuple(search.history),
-        robot=robots[chosen.sessions[-1] if chosen.sessions else ""],
-        robots=_of_sessions(robots, held),
-        prior_test=tested_prior(estimator, estimate),
-        fit=Fit(commanded, start, end, estimate, sure),
-    )
-
-
-def _of_sessions(
-    robots: Mapping[str, Robot | SerialArm], held: HeldOut
-) -> dict[str, Robot | SerialArm]:
-    """The machines of all sessions by name, those that were held out with them."""
-    found = {name: robot for name, robot in robots.items() if name}
-    if found and held.holdout_later is not None and held.holdout_end is not None:
-        chosen = held.holdout_later.parameters
-        for name in chosen.sessions:
-            if name not in found:
-                values = chosen.values_at(held.holdout_end.theta, chosen.geometry_of(name))
-                found[name] = as_given(chosen.robot.replace(values))
-    return found
-
-
-def _robots(commanded: Equations, end: Evaluation) -> dict[str, Robot | SerialArm]:
-    """The machine of each session, "" where there are none, at the parameters of an evaluation."""
-    chosen, found = commanded.parameters, {}
-    for session in chosen.sessions or ("",):
-        columns = chosen.geometry_of(session)
-        robot = as_given(chosen.robot.replace(chosen.values_at(end.theta, columns)))
-        table = commanded.table
-        own = (table.machine_columns == columns).all(axis=1)[table.machine_of_pose]
-        if isinstance(robot, Robot):
-            robot = robot.closing(commanded.actuators[own], end.pose[own])
-        found[session] = robot
     return found

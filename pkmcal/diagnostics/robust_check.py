@@ -82,7 +82,7 @@ def robust_check(fit: Fit) -> RobustCheck | None:
     noise = estimate.state.noise
     of_sets = np.concatenate([noise[[i for _, i in drawn]], noise[len(equations.sets) :]])
     plain = equations.residual(estimate.evaluation, noise)
-    squares = few.squares(few.residual(robust.evaluation, of_sets))
+    squares = few.blocks.squares(few.residual(robust.evaluation, of_sets))
     scale = median_ratio(squares, few.components) * m / (m - p)
     named = outlying(estimator, robust)
     if not scale > 0:

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pkmcal.diagnostics.plausibility import (
+from pkmcal.diagnostics.units import (
     GROSS,
     MISFIT_RATIO,
     exchanges,

@@ -20,7 +20,6 @@ for noise would make small whatever geometry lets them agree.
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Sequence
 from typing import Protocol
 
@@ -55,9 +54,6 @@ class Closures(Protocol):
 
     def residual(self, robot: Calibratable, states: RowStates) -> tuple[FloatArray, FloatArray]:
         """The equations (K, equations), whitened, and their derivative by the unknowns."""
-
-    def shifted(self, by: FloatArray) -> Closures:
-        """The same with whitened equations (K, equations) that are larger: of other readings."""
 
     def lengths(self, robot: Calibratable) -> FloatArray:
         """Factors (equations,) to mm of the equations times their sigma."""
@@ -98,10 +94,6 @@ class Commanded:
         """No equations."""
         return np.empty((len(self.read), 0)), np.empty((len(self.read), 0, 0))
 
-    def shifted(self, by: FloatArray) -> Commanded:
-        """No equations."""
-        return self
-
     def lengths(self, robot: Calibratable) -> FloatArray:
         """No equations."""
         return np.empty(0)
@@ -140,7 +132,6 @@ class NoisyActuators:
         self._free = np.flatnonzero(sigma.any(axis=0))
         self.sigma: FloatArray | None = sigma[:, self._free]
         self._white = 1.0 / self.sigma
-        self._shift: FloatArray | float = 0.0
         self.unknowns = self.equations = len(self._free)
         self.actuators: tuple[int, ...] = tuple(self._free.tolist())
 
@@ -158,13 +149,7 @@ class NoisyActuators:
     def residual(self, robot: Calibratable, states: RowStates) -> tuple[FloatArray, FloatArray]:
         """Where they are less what they read."""
         off = (states.actuators - self.read)[:, self._free]
-        return off * self._white + self._shift, self._white[:, :, None] * np.eye(self.unknowns)
-
-    def shifted(self, by: FloatArray) -> NoisyActuators:
-        """The same with larger equations."""
-        other = copy.copy(self)
-        other._shift = self._shift + by
-        return other
+        return off * self._white, self._white[:, :, None] * np.eye(self.unknowns)
 
     def lengths(self, robot: Calibratable) -> FloatArray:
         """Of the actuators' units."""
@@ -230,16 +215,14 @@ class FreePoses:
             common = np.mean(sigma * mm_per_unit(robot.actuator_units, robot.length), axis=1)
             each = [sigma[:, a] if a >= 0 else common for a in self.actuators]
             sigma = np.stack(each, axis=1)
-        self._state(sigma)
-        self._shift: FloatArray | None = None
-
-    def _state(self, sigma: FloatArray) -> None:
-        """State the deviations (K, equations), and what they whiten with."""
         self.sigma: FloatArray | None = sigma
-        self._white = 1.0 / sigma
-        alike = bool((sigma == sigma[:1]).all())
-        white = self._white[:1] if alike else self._white
-        self._white_steps = np.repeat(white[:, :, None], self.unknowns, axis=2)
+        self._white, self._white_steps = self._whitening(sigma)
+
+    def _whitening(self, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """What deviations (K, equations) whiten equations with, and their derivatives."""
+        white = 1.0 / sigma
+        some = white[:1] if (sigma == sigma[:1]).all() else white
+        return white, np.repeat(some[:, :, None], self.unknowns, axis=2)
 
     def settled(self, robot: Calibratable, states: RowStates) -> RowStates:
         """Poses stay where they are, or where joints hold them, until they are fitted."""
@@ -259,16 +242,8 @@ class FreePoses:
         if len(self._held):
             by_step = by_step @ self._allowed(robot, states)[0]
         off *= self._white
-        if self._shift is not None:
-            off += self._shift
         by_step *= self._white_steps
         return off, by_step
-
-    def shifted(self, by: FloatArray) -> FreePoses:
-        """The same with larger equations."""
-        other = copy.copy(self)
-        other._shift = by if self._shift is None else self._shift + by
-        return other
 
     def lengths(self, robot: Calibratable) -> FloatArray:
         """Of the actuators' units; the other rows are in mm."""

@@ -14,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray
+from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.core.library import STATUS
 from pkmcal.estimation.elimination import Shares
 from pkmcal.estimation.evaluation import Cache, Evaluation
@@ -33,14 +33,11 @@ from pkmcal.estimation.session_machines import (
     commanded_closures,
 )
 from pkmcal.estimation.whitening import Whitening
-from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.drive_state import DriveState
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.readings import joint_angles, orientation
 from pkmcal.result import failed_rows
 
 _TOGETHER = 16384  # rows whose readings are kept with their derivatives
-_ROUNDING = 2e-15  # of the largest value: the error of a solved pose
 
 Near = Evaluation | RowStates | None  # where a search for poses begins
 Batch = tuple[slice, slice, FloatArray]  # blocks, their equations, and their derivative (m, n)
@@ -107,7 +104,7 @@ class Equations:
         )
         if not closures.unknowns:
             return equations
-        _refuse_what_needs_exact_actuators(prediction)
+        prediction.refuse_free_poses()
         of_cells = [cells is not None and cells.sigma is None] if closures.cells else []
         groups = np.concatenate([unstated, of_cells, [sigma is None]]).astype(bool)
         slack = np.zeros((len(table.actuators), closures.equations), dtype=bool)
@@ -165,27 +162,10 @@ class Equations:
         """What takes the misfit of each set to mm: where angles alone were read, the length."""
         return tuple(m.instrument.arc(m, self.parameters.robot.length) for m in self.sets)
 
-    @cached_property
-    def guess(self) -> RowStates:
-        """Where a search for the poses begins: at home, or where they were read."""
-        guess = np.tile(self.parameters.robot.home, (len(self.actuators), 1))
-        every = zip(self.sets, self.pose_of, self.prediction.arguments, strict=True)
-        for measured, place, arguments in every:
-            elsewhere = arguments.framed or "tool" in arguments.columns
-            if measured.kind in ("pose", "position") and not elsewhere:
-                known = np.isfinite(measured.values)
-                ever = np.flatnonzero(known.any(axis=0))  # not across a plane, say
-                read = np.flatnonzero(known[:, ever].all(axis=1))
-                values = measured.values[np.ix_(read, ever)]
-                if 5 in ever:  # angles are read together
-                    values[:, -3:] = orientation.shortest(values[:, -3:])
-                guess[np.ix_(place[read], ever)] = values
-        return RowStates(guess, self.actuators, np.zeros(len(guess), dtype=np.int32))
-
     @property
     def size(self) -> float:
         """The largest number that the equations are made of, mm."""
-        largest = np.abs(self.guess.pose).max(), np.abs(self.actuators).max()
+        largest = np.abs(self.prediction.guess.pose).max(), np.abs(self.actuators).max()
         return float(max(self.parameters.robot.length, *largest))
 
     @property
@@ -200,10 +180,8 @@ class Equations:
     @property
     def slack_cells(self) -> list[tuple[int, int]]:
         """Closures that are left out, of slack cables: their poses and numbers."""
-        if not isinstance(self.blocks, PoseBlocks):
-            return []
-        pose, closure = np.nonzero(self.blocks.slack)
-        return list(zip(pose.tolist(), closure.tolist(), strict=True))
+        slack = np.argwhere(self.blocks.slack) if isinstance(self.blocks, PoseBlocks) else []
+        return [(int(pose), int(closure)) for pose, closure in slack]
 
     @cached_property
     def system(self) -> PoseSystem | None:
@@ -258,46 +236,6 @@ class Equations:
         """Give the components (k,) of each set other relative deviations."""
         return replace(self, whitening=self.whitening.reweighted(deviations))
 
-    def redrawn(
-        self,
-        at: Evaluation,
-        noise: FloatArray,
-        reduced: FloatArray,
-        prior_centre: FloatArray,
-        drawn: FloatArray | None = None,
-    ) -> tuple[Equations, Evaluation]:
-        """The equations of other readings, and evaluated where these have been drawn.
-
-        Parameters
-        ----------
-        at : Evaluation
-            Where the machine is taken to be.
-        noise : ndarray (G,)
-            See `Whitening`.
-        reduced : ndarray (M,)
-            The residuals of the new readings there, as `residual`.
-        drawn : ndarray (s,), optional
-            That of `Parameters`.
-        prior_centre : ndarray (n,)
-            Another centre of the prior.
-        """
-        errors, closures = reduced, self.closures
-        if self.system is not None:
-            closures, errors = self.system.redrawn(at, noise, reduced)
-        residuals = tuple(self.whitening.unwhiten(errors, noise[: len(self.sets)]))
-        sets = tuple(
-            replace(m, values=m.instrument.corrected(values, residual).reshape(m.values.shape))
-            for m, values, residual in zip(self.sets, at.predicted, residuals, strict=True)
-        )
-        parameters = replace(self.parameters, start=prior_centre, drawn=drawn)
-        prediction = replace(
-            self.prediction, table=replace(self.table, sets=sets), parameters=parameters
-        )
-        other = replace(self, prediction=prediction, closures=closures)
-        if self.closures.unknowns:
-            return other, other.at(at.theta, noise, at)
-        return other, replace(at, parameters=parameters, residuals=residuals, cache={})
-
     # evaluations ----------------------------------------------------------------------------------
 
     def at(
@@ -342,7 +280,7 @@ class Equations:
         parameters to start from, of which only `own` (n,) are aligned.
         """
         theta = self.parameters.start.copy() if near is None else near.copy()
-        states = self.guess if states is None else states
+        states = self.prediction.guess if states is None else states
         evaluation = self.at(theta, near=states)
         if not evaluation.ok:
             home = self.parameters.robot.home
@@ -384,7 +322,7 @@ class Equations:
 
     def _begun(self, near: Near) -> RowStates:
         if near is None:
-            return self.guess
+            return self.prediction.guess
         return near.onward if isinstance(near, Evaluation) else near
 
     def _states_ahead(self, machines: Machines, theta: FloatArray, near: Near) -> RowStates:
@@ -411,12 +349,6 @@ class Equations:
             return -self.system.at(evaluation, noise).reduced
         return self.whitening.whitened(evaluation.residuals, noise)
 
-    def squares(self, residual: FloatArray) -> FloatArray:
-        """Squared length of the residuals (M,) of each block, (B,)."""
-        first = np.cumsum(self.components) - self.components
-        squares: FloatArray = np.add.reduceat(residual**2, first)
-        return squares
-
     def by_parameters(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
         """Derivative (M, n) of what is predicted by the parameters, whitened and reduced."""
         found = np.empty((int(self.components.sum()), len(self.parameters)))
@@ -426,23 +358,18 @@ class Equations:
 
     def batches(self, evaluation: Evaluation, noise: FloatArray) -> Iterator[Batch]:
         """`by_parameters` in batches of whole blocks; in one where poses have unknowns."""
-        blocks = equations = slice(0, 0)
-        for count, by_parameters in self._batches(evaluation, noise):
-            blocks = slice(blocks.stop, blocks.stop + count)
-            equations = slice(equations.stop, equations.stop + len(by_parameters))
-            yield blocks, equations, by_parameters
-
-    def _batches(
-        self, evaluation: Evaluation, noise: FloatArray
-    ) -> Iterator[tuple[int, FloatArray]]:
         if self.system is not None:
-            yield self.system.by_parameters(evaluation, noise)
+            found = self.system.by_parameters(evaluation, noise)
+            yield slice(0, len(self.components)), slice(0, len(found)), found
             return
-        whiten_rows = self.whitening.whiten_rows
+        blocks = equations = slice(0, 0)
         for batch, parts in self.prediction.derivatives(evaluation, self.closures):
-            white = [whiten_rows(part, i, rows, noise) for i, rows, part in parts]
+            white = [self.whitening.whiten_rows(part, i, rows, noise) for i, rows, part in parts]
             whole = white[0] if len(white) == 1 else np.concatenate(white)
-            yield int(np.count_nonzero(self.table.count[batch])), whole
+            read = int(np.count_nonzero(self.table.count[batch]))
+            blocks = slice(blocks.stop, blocks.stop + read)
+            equations = slice(equations.stop, equations.stop + len(whole))
+            yield blocks, equations, whole
 
     def jacobian(self, evaluation: Evaluation) -> list[FloatArray]:
         """Derivative of the predicted values of each set to the parameters, (N, k, n)."""
@@ -482,50 +409,7 @@ class Equations:
         squares = np.bincount(group, residual**2, count).astype(np.float64)
         return Shares(squares, freedom, np.diag(freedom))
 
-    def rounding(self, noise: FloatArray) -> float:
-        """Length of the whitened rounding errors of what is predicted."""
-        length, readings = self.parameters.robot.length, 0.0
-        if self.whitening.any_read or not self.sets:
-            parts = [_rounded(m, length) for m in self.sets]
-            readings = float(np.linalg.norm(self.whitening.whitened(parts, noise)))
-        sigma = self.closures.sigma
-        if sigma is None or not isinstance(self.blocks, PoseBlocks):
-            return readings
-        size = _ROUNDING * float(np.abs(self.actuators).max())
-        whitened = size / (noise[self.blocks.groups] * sigma)
-        return float(np.hypot(readings, np.linalg.norm(whitened)))
-
-    def status(self, evaluation: Evaluation) -> Int32Array:
-        """Of the forward kinematics, for each row."""
-        return np.concatenate([evaluation.status[place] for place in self.pose_of])
-
     def failures(self, evaluation: Evaluation) -> str:
         """Say which rows failed and why; empty where the forward kinematics solved all."""
-        return failed_rows(self.status(evaluation), STATUS, self.rows, most=10)
-
-
-def _refuse_what_needs_exact_actuators(prediction: Prediction) -> None:
-    """Refuse effects, and readings of joints and between poses, where poses have unknowns."""
-    if any(arguments.effects for arguments in prediction.arguments):
-        raise ArgumentError(
-            "expansion: needs poses that follow from the actuators: no actuator_sigma, and"
-            " no surplus actuators; found others"
-        )
-    robot = prediction.parameters.robot
-    for m in prediction.table.sets:
-        follows = m.joint and joint_angles.follows_pose(robot, m.joint)
-        if m.kind in ("between", "angle") and not follows:
-            raise ArgumentError(
-                f"measurements: readings of kind {m.kind!r} need poses that follow from the"
-                " actuators: no actuator_sigma, and no surplus actuators"
-            )
-
-
-def _rounded(measured: Measurements, length: float) -> FloatArray:
-    """Rounding errors (N, k) of what is predicted, mm and rad."""
-    values = measured.values.reshape(len(measured), -1)
-    lengths = np.array([unit == "mm" for unit in measured.units], dtype=bool)
-    size = np.max(np.nan_to_num(np.abs(values[:, lengths])), initial=0.0) + length
-    return np.broadcast_to(
-        _ROUNDING * size / measured.instrument.mm(measured, length), values.shape
-    )
+        status = np.concatenate([evaluation.status[place] for place in self.pose_of])
+        return failed_rows(status, STATUS, self.rows, most=10)

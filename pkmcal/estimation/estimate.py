@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pkmcal.arrays import FloatArray
 from pkmcal.estimation.elimination import Shares
 from pkmcal.estimation.evaluation import Evaluation
-from pkmcal.estimation.identifiability import Directions
+from pkmcal.estimation.identifiability import Decomposed, Directions
 from pkmcal.estimation.loss import Loss
 
 
@@ -30,6 +30,11 @@ class IterationState:
         Determined to `worst` or better; the rest is kept at its start.
     worst : float
         A standard deviation, mm: the machine's size, or less where searches did not end.
+    at_start : tuple of Decomposed
+        Combinations at the start, without and with the prior, at this noise.
+    first_freedom : ndarray (G,) or None
+        Degrees of freedom at equal noise of all groups, where poses have unknowns and some noise
+        has been estimated.
     """
 
     noise: FloatArray
@@ -38,6 +43,8 @@ class IterationState:
     determined: Directions
     fitted: Directions
     worst: float
+    at_start: tuple[Decomposed, Decomposed]
+    first_freedom: FloatArray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +53,8 @@ class Estimate:
 
     All of it is of the M equations that are left when poses have taken their part: noise is 1 in
     each, and those of different poses are independent. Nothing else of poses and closures is to be
-    known to judge a fit: `Equations.pose_of_unit` says which units are of one pose.
+    known to judge a fit: `RowBlocks.pose_of_block` says which
+    blocks are of one pose.
 
     Attributes
     ----------
@@ -61,8 +69,8 @@ class Estimate:
         Jacobian, which is not kept beside it: `change` is what that says.
     triangle : ndarray (k, n)
         R of a QR factorisation of the scaled, whitened Jacobian, k = min(M, n).
-    weights : ndarray (U,)
-        Of each unit (`Equations.components`); 1 unless the loss is robust.
+    weights : ndarray (B,)
+        Of each block (`Equations.components`); 1 unless the loss is robust.
     prior : ndarray (p, n)
         A row for each prior, scaled, in units of its deviation.
     basis : ndarray (n, n)
@@ -70,6 +78,8 @@ class Estimate:
         determined.
     shares : Shares
         Of each group, the sum of squared residuals and what it says of the noise.
+    converged, evaluations, history
+        Those of the search, `Trail`.
     """
 
     evaluation: Evaluation
@@ -81,6 +91,9 @@ class Estimate:
     prior: FloatArray
     basis: FloatArray
     shares: Shares
+    converged: bool
+    evaluations: int
+    history: tuple[float, ...]
 
     @property
     def half(self) -> FloatArray:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray
@@ -14,7 +16,7 @@ from pkmcal.estimation.identifiability import (
     decompose,
     directions,
 )
-from pkmcal.estimation.least_squares import Search
+from pkmcal.estimation.least_squares import Search, Trail
 from pkmcal.estimation.loss import Loss, LossName
 from pkmcal.exceptions import ArgumentError
 from pkmcal.statistics import prior_test
@@ -36,9 +38,6 @@ FEW = 5.0  # below which residuals hardly show it
 LEAST_REDUNDANCY = 2.0  # the same of one group of several that share poses
 
 
-_AtNoise = tuple[FloatArray, tuple[Decomposed, Decomposed]]  # noise; without and with the prior
-
-
 class Estimator:
     """Weighted least squares, iterated with the noise and rank that they imply.
 
@@ -58,10 +57,6 @@ class Estimator:
         self.scale = self.search.scale
         self._priors = len(self.search.prior(start.theta))
         self.unstated = equations.unstated
-        self._worst = self.start.robot.length
-        self._at_first: FloatArray | None = None
-        self._first: _AtNoise | None = None
-        self._estimated: Estimate | None = None
 
     @property
     def least_freedom(self) -> float:
@@ -74,7 +69,8 @@ class Estimator:
         Where poses have unknowns it is what is left at equal noise of all groups: one that turns
         out small beside the others has little left, but is known to be small.
         """
-        freedom = estimate.freedom if self._at_first is None else self._at_first
+        first = estimate.state.first_freedom
+        freedom = estimate.freedom if first is None else first
         return self.unstated & (freedom < self.least_freedom)
 
     def solve(self, near: Evaluation | None = None) -> Estimate:
@@ -82,29 +78,32 @@ class Estimator:
 
         The search begins at `near`, or else at the start.
         """
-        state = self._state(self._first_noise(), self._first_loss(), None)
+        size = self.start.robot.length
+        state = self._state(self._first_noise(), self._first_loss(), size)
         if not state.fitted.rank:
             names = ", ".join(self.equations.parameters.names)
             raise ArgumentError(f"they depend on none of {names}")
-        u = np.zeros(len(self.scale))
+        u, trail = np.zeros(len(self.scale)), self.search.begin()
         if near is not None:
-            self.search.near = near
+            trail = replace(trail, near=near)
             u = (near.theta - self.start.theta) / self.scale
         risen: set[tuple[int, int]] = set()
         for _ in range(_ROUNDS):
             # rows that nothing contradicts pin what is not determined
             kept = state.fitted.unidentifiable
             pins = state.fitted.singular[0] * kept.T
-            u = self.search.best(u, state.noise, state.loss, pins)
+            u, trail = self.search.best(trail, u, state.noise, state.loss, pins)
             u = u - kept @ (kept.T @ u)
-            estimate = self._estimate(u, state)
-            fewer = None if self.search.converged else self._fewer(estimate)
+            trail = self.search.at(trail, u, state.noise)
+            estimate = self._estimate(trail, state)
+            fewer = None if trail.converged else self._fewer(estimate)
             if fewer is not None:
                 state, u = fewer, np.zeros(len(self.scale))
-                self.search.near = self.start
+                trail = replace(trail, near=self.start)
                 continue
-            if self.equations.closures.unknowns and self._at_first is None:
-                self._at_first = estimate.freedom
+            if self.equations.closures.unknowns and state.first_freedom is None:
+                state = replace(state, first_freedom=estimate.freedom)
+                estimate = replace(estimate, state=state)
             revised = self._revised(estimate)
             rise = state.fitted.rank, revised.fitted.rank
             if rise in risen:
@@ -116,10 +115,13 @@ class Estimator:
             if settled:
                 break
         factor = self._common_factor(estimate.state, state)
-        found = self._estimate(u, state) if factor is None else estimate.with_noise(state, factor)
-        self.search.forget()
-        self._estimated = None
-        return found
+        if factor is None:
+            trail = self.search.at(trail, u, state.noise)
+            estimate = self._estimate(trail, state)
+        else:
+            estimate = estimate.with_noise(state, factor)
+        self.search.end(trail)
+        return estimate
 
     # between the least squares ------------------------------------------------------------------
 
@@ -172,7 +174,7 @@ class Estimator:
 
     def _medians(self, residual: FloatArray) -> FloatArray:
         """Variance (F,) that whitened residuals (M,) of each family show by their median."""
-        squares, components = self.equations.squares(residual), self.equations.components
+        squares, components = self.equations.blocks.squares(residual), self.equations.components
         family_of = self.equations.blocks.family_of_block
         return np.array([
             median_ratio(squares[family_of == f], components[family_of == f])
@@ -180,43 +182,58 @@ class Estimator:
         ])  # fmt: skip
 
     def _state(
-        self, noise: FloatArray, loss: Loss, evaluation: Evaluation | None
+        self,
+        noise: FloatArray,
+        loss: Loss,
+        worst: float,
+        last: Estimate | None = None,
+        fitted: bool = False,
     ) -> IterationState:
-        """Split the directions for this noise, before (`evaluation` None) or after a fit."""
+        """Split the directions for this noise, before or after a fit; `last` is the last estimate.
+
+        `worst` is that of `IterationState`.
+        """
         size = self.start.robot.length
-        noise_known = evaluation is not None or not self.unstated.any() or self._worst < size
-        worst = self._worst if noise_known else np.inf
-        self._first = noise, self._decomposed(self.start, noise, self._first)
-        _, first = self._first
-        now = (None, None) if evaluation is None else self._decomposed(evaluation, noise)
+        kept, noise_known = worst, fitted or not self.unstated.any() or worst < size
+        worst = worst if noise_known else np.inf
+        first = self._decomposed(self.start, noise, last, None if last is None else last.state)
+        now: tuple[Decomposed | None, Decomposed | None] = (None, None)
+        if fitted and last is not None:
+            now = self._decomposed(last.evaluation, noise, last)
         measured = directions(first[0], now[0], size)
         determined = directions(first[1], now[1], size)
-        fitted = directions(first[1], now[1], size, worst)
-        return IterationState(noise, loss, measured, determined, fitted, self._worst)
+        wanted = directions(first[1], now[1], size, worst)
+        freedom = None if last is None else last.state.first_freedom
+        return IterationState(noise, loss, measured, determined, wanted, kept, first, freedom)
 
     def _decomposed(
         self,
         evaluation: Evaluation,
         noise: FloatArray,
-        known: _AtNoise | None = None,
+        last: Estimate | None,
+        known: IterationState | None = None,
     ) -> tuple[Decomposed, Decomposed]:
-        """Decompose without and with the prior; `known` is that for another noise."""
+        """Decompose without and with the prior.
+
+        `last` is the last estimate, `known` the state with that of the start for another noise.
+        """
         if known is not None:
-            factors = noise / known[0]
+            factors = noise / known.noise
             if (factors == 1.0).all():
-                return known[1]
+                return known.at_start
             if not self._priors and (factors == factors[0]).all():
-                singular, basis = known[1][0]
+                singular, basis = known.at_start[0]
                 return ((singular / factors[0], basis),) * 2
-        factor = self._triangle(evaluation, noise)
+        factor = self._triangle(evaluation, noise, last)
         data = decompose(factor)
         if not self._priors:
             return data, data
         return data, decompose(factor, self.search.prior(evaluation.theta))
 
-    def _triangle(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
+    def _triangle(
+        self, evaluation: Evaluation, noise: FloatArray, last: Estimate | None
+    ) -> FloatArray:
         """R of the Jacobian, made of that of the last estimate where all noise has grown alike."""
-        last = self._estimated
         if last is not None and last.evaluation is evaluation:
             factors = noise / last.state.noise
             if (factors == factors[0]).all():
@@ -229,13 +246,13 @@ class Estimator:
 
         It went along what is hardly determined, far from any machine: less of it is fitted.
         """
-        before, noise = self._worst, self._revised(estimate).noise
-        while self._worst > _LEAST_WORST * self.start.robot.length:
-            self._worst *= _LESS
-            state = self._state(noise, estimate.state.loss, None)
+        revised = self._revised(estimate)
+        worst, last = estimate.state.worst, replace(estimate, state=revised)
+        while worst > _LEAST_WORST * self.start.robot.length:
+            worst *= _LESS
+            state = self._state(revised.noise, estimate.state.loss, worst, last)
             if 0 < state.fitted.rank < estimate.state.fitted.rank:
                 return state
-        self._worst = before
         return None
 
     def _revised(self, estimate: Estimate) -> IterationState:
@@ -247,7 +264,8 @@ class Estimator:
         families = range(len(of_families))
         none_stated = np.array([bool(self.unstated[family_of == f].all()) for f in families])
         width = np.where(none_stated, 1.0, np.maximum(of_families, 1.0))
-        return self._state(noise, self._loss(self.loss, width), estimate.evaluation)
+        loss = self._loss(self.loss, width)
+        return self._state(noise, loss, estimate.state.worst, estimate, fitted=True)
 
     def _spread(self, estimate: Estimate) -> tuple[FloatArray, FloatArray]:
         """Deviation of the whitened residuals of each group (G,), and of each family (F,)."""
@@ -327,10 +345,10 @@ class Estimator:
                 factor = triangle(factor, self.equations.whitening.stacked(part, i, rows))
         return factor
 
-    def _estimate(self, u: FloatArray, state: IterationState) -> Estimate:
-        evaluation = self.search.at(u, state.noise)
-        self._estimated = None
-        design = self.search.taken(evaluation, state.noise)
+    def _estimate(self, trail: Trail, state: IterationState) -> Estimate:
+        """The statistics where a search has come to."""
+        evaluation = trail.here
+        design = self.search.own_jacobian(evaluation, state.noise)
         residual = self.equations.residual(evaluation, state.noise)
         weights = state.loss.weights(residual)
         root = np.sqrt(np.repeat(weights, self.equations.components))
@@ -349,6 +367,17 @@ class Estimator:
             root * residual,
             taken if linear else root[:, None] * taken,
         )
-        found = Estimate(evaluation, state, residual, design, factor, weights, prior, basis, shares)
-        self._estimated = found
-        return found
+        return Estimate(
+            evaluation,
+            state,
+            residual,
+            design,
+            factor,
+            weights,
+            prior,
+            basis,
+            shares,
+            trail.converged,
+            trail.evaluations,
+            trail.history,
+        )

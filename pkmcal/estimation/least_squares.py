@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.estimation.equations import Batch, Equations
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.loss import Loss
-from pkmcal.estimation.misfits import progress
+from pkmcal.estimation.misfits import progress, rounding
 from pkmcal.exceptions import ArgumentError
 from pkmcal.statistics.linear_fit import triangle
 
@@ -20,6 +21,42 @@ _MOST = 200  # evaluations
 _CONVERGED = (1, 2, 3, 4)  # as MINPACK says it
 
 Function = Callable[[FloatArray], FloatArray]
+
+
+@dataclass(frozen=True, eq=False)
+class Trail:
+    """How far a search has come.
+
+    Attributes
+    ----------
+    near : Evaluation
+        The last step taken: where poses are looked for.
+    u, noise : ndarray (n,), ndarray (G,)
+        Where the equations were evaluated last, and with which noise.
+    here : Evaluation
+        The equations there.
+    evaluations : int
+        How often the machine was solved for all rows.
+    converged : bool
+        Whether the last search did.
+    history : tuple of float
+        Misfit of the rows that were reached at the start and after every step taken, rms in mm; of
+        the closures where nothing else was read.
+    """
+
+    near: Evaluation
+    u: FloatArray
+    noise: FloatArray
+    here: Evaluation
+    evaluations: int = 0
+    converged: bool = False
+    history: tuple[float, ...] = ()
+
+    def after(self, step: Evaluation, misfit: float) -> Trail:
+        """The trail with another step; poses follow the parameters from there."""
+        if self.near is not step:
+            self.near.cache.pop("following", None)
+        return replace(self, near=step, history=(*self.history, misfit))
 
 
 class Search:
@@ -38,13 +75,6 @@ class Search:
     ----------
     scale : ndarray (n,)
         That of `Parameters`.
-    evaluations : int
-        How often the machine was solved for all rows.
-    converged : bool
-        Whether the last search did.
-    history : list of float
-        Misfit of the rows that were reached at the start and after every step taken, rms in mm; of
-        the closures where nothing else was read.
     """
 
     def __init__(
@@ -52,31 +82,29 @@ class Search:
     ) -> None:
         parameters = equations.parameters
         self._found: IntArray | slice = slice(None) if columns is None else columns
-        self.equations, self.start, self.near = equations, start, start
+        self.equations, self.start = equations, start
         self.scale = parameters.scale[self._found]
         rows = parameters.prior_rows(start.theta)[:, self._found]
         self._stated = np.flatnonzero(rows.any(axis=1))
         lower, upper = ((end - start.theta)[self._found] / self.scale for end in parameters.bounds)
         bounded = bool(np.isfinite([lower, upper]).any())
         self._bounds = (lower, upper) if bounded else None
-        ones = np.ones(len(equations.unstated))
-        self._last: tuple[FloatArray, FloatArray, Evaluation]
-        self._last = (np.zeros(len(self.scale)), ones, start)
         self._equations = int(equations.components.sum())
-        self._last_jacobian: tuple[Evaluation, FloatArray, FloatArray] | None = None
-        self._refused = np.zeros(len(equations.components), dtype=bool)
-        self.evaluations = 0
-        self.converged = False
-        self.history: list[float] = []
+        self._cache: dict[str, tuple[Evaluation, FloatArray, FloatArray]] = {}  # a Jacobian
 
-    def at(self, u: FloatArray, noise: FloatArray) -> Evaluation:
-        """The equations at scaled parameters (n,), poses found with this noise (G,)."""
-        same = not self.equations.closures.unknowns or _same(noise, self._last[1])
-        if not (same and _same(u, self._last[0])):
-            there = self.equations.at(self._theta(u), noise, self.near)
-            self._last = (u.copy(), noise, there)
-            self.evaluations += 1
-        return self._last[2]
+    def begin(self) -> Trail:
+        """The trail of a search that has not begun."""
+        u, ones = np.zeros(len(self.scale)), np.ones(len(self.equations.unstated))
+        return Trail(self.start, u, ones, self.start)
+
+    def at(self, trail: Trail, u: FloatArray, noise: FloatArray) -> Trail:
+        """Evaluate the equations at scaled parameters (n,), poses found with this noise (G,)."""
+        same = not self.equations.closures.unknowns or _same(noise, trail.noise)
+        if same and _same(u, trail.u):
+            return trail
+        there = self.equations.at(self._theta(u), noise, trail.near)
+        count = trail.evaluations + 1
+        return replace(trail, u=u.copy(), noise=noise, here=there, evaluations=count)
 
     def prior(self, theta: FloatArray) -> FloatArray:
         """A row (p, n) for each prior at all parameters `theta`, in units of its deviation."""
@@ -108,12 +136,12 @@ class Search:
         ValueError
             It does not exist, at a singularity of the machine.
         """
-        found = self.taken(evaluation, noise)
-        self._last_jacobian = evaluation, noise, found
+        found = self.own_jacobian(evaluation, noise)
+        self._cache["jacobian"] = evaluation, noise, found
         return found
 
-    def taken(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
-        """The same, which is the caller's: it is not kept."""
+    def own_jacobian(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
+        """As `jacobian`, for a caller who changes it: it is not kept."""
         found = np.empty((self._equations, len(self.scale)))
         for _, some, by_u in self._batches(evaluation, noise):
             if len(by_u) == len(found):
@@ -122,22 +150,22 @@ class Search:
         return found
 
     def triangle(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
-        """R of a QR factorisation of it. Of several lots none is kept."""
+        """R of a QR factorisation of the Jacobian. Of several batches none is kept."""
         factor = np.zeros((0, len(self.scale)))
         for _, _, by_u in self._batches(evaluation, noise):
             factor = triangle(factor, _finite(by_u))
             if len(by_u) == self._equations:
-                self._last_jacobian = evaluation, noise, by_u
+                self._cache["jacobian"] = evaluation, noise, by_u
         return factor
 
-    def forget(self) -> None:
-        """A search has ended: what is kept for its next step takes memory."""
-        self._last_jacobian = None
-        self.near.cache.pop("following", None)
+    def end(self, trail: Trail) -> None:
+        """Forget what the next step would need: it takes memory."""
+        self._cache.clear()
+        trail.near.cache.pop("following", None)
 
     def _batches(self, evaluation: Evaluation, noise: FloatArray) -> Iterator[Batch]:
-        """`taken` in lots, finite or not."""
-        last, self._last_jacobian = self._last_jacobian, None
+        """`own_jacobian` in batches, finite or not."""
+        last = self._cache.pop("jacobian", None)
         if last is not None and last[0] is evaluation and _same(last[1], noise):
             yield slice(0, len(self.equations.components)), slice(0, self._equations), last[2]
             return
@@ -147,46 +175,59 @@ class Search:
             by_u *= self.scale
             yield blocks, some, by_u
 
-    def best(self, u: FloatArray, noise: FloatArray, loss: Loss, pins: FloatArray) -> FloatArray:
-        """Where the cost is least, from `u` (n,).
+    def best(
+        self, trail: Trail, u: FloatArray, noise: FloatArray, loss: Loss, pins: FloatArray
+    ) -> tuple[FloatArray, Trail]:
+        """Where the cost is least, from `u` (n,), and the trail there.
 
         Rows that the machine cannot reach bar the way of a step. Where that happened, the search
         goes round: first without those rows, then from there with all of them.
 
         Parameters
         ----------
+        trail : Trail
+            How far the search has come.
         u : ndarray (n,)
             Where to start.
         noise : ndarray (G,)
-            See `Equations.whitened`.
+            See `Whitening`.
         loss : Loss
             How rows count.
         pins : ndarray (d, n)
             Rows that hold the combinations that measurements and prior do not identify.
         """
-        self._refused[:] = False
-        everything = np.zeros_like(self._refused)
-        straight, cost = self._minimum(u, noise, loss, pins, everything)
-        barred = self._refused.copy()
+        everything = np.zeros(len(self.equations.components), dtype=bool)
+        trail, straight, cost, barred = self._minimum(trail, u, noise, loss, pins, everything)
         if not barred.any() or barred.all():
-            return straight
-        converged, here = self.converged, self.at(straight, noise)
-        around, _ = self._minimum(u, noise, loss, pins, barred)
-        if self.at(around, noise).ok:
-            around, other = self._minimum(around, noise, loss, pins, everything)
+            return straight, trail
+        first = self.at(trail, straight, noise)
+        trail, around, _, _ = self._minimum(first, u, noise, loss, pins, barred)
+        trail = self.at(trail, around, noise)
+        if trail.here.ok:
+            found = self._minimum(trail, around, noise, loss, pins, everything)
+            trail, around, other, _ = found
             if other < cost:
-                return around
-        self.converged, self._last = converged, (straight, noise, here)
-        self.near = here
-        return straight
+                return around, trail
+        back = replace(first, near=first.here, noise=noise, u=straight)
+        return straight, replace(back, evaluations=trail.evaluations, history=trail.history)
 
     def _minimum(
-        self, u: FloatArray, noise: FloatArray, loss: Loss, pins: FloatArray, aside: BoolArray
-    ) -> tuple[FloatArray, float]:
-        """A minimum of the cost of the rows not set aside, and the cost."""
+        self,
+        trail: Trail,
+        u: FloatArray,
+        noise: FloatArray,
+        loss: Loss,
+        pins: FloatArray,
+        aside: BoolArray,
+    ) -> tuple[Trail, FloatArray, float, BoolArray]:
+        """A minimum of the cost of the blocks not set aside, the cost, and the blocks in its way.
+
+        Those are the blocks (B,) of rows that some step could not reach.
+        """
         equations = self.equations
         without = np.repeat(aside, equations.components)
         last: tuple[Evaluation, FloatArray] | None = None
+        refused = np.zeros_like(aside)
 
         def data(evaluation: Evaluation) -> FloatArray:
             nonlocal last
@@ -197,18 +238,21 @@ class Search:
             return last[1]
 
         # a cost that nothing lowers: by less than rounding it need not fall
-        floor = equations.rounding(noise) / np.sqrt(_FTOL)
-        first = data(self.at(u, noise))
+        floor = rounding(equations, noise) / np.sqrt(_FTOL)
+        trail = self.at(trail, u, noise)
+        first = data(trail.here)
         worse = 10.0 * (1.0 + float(np.linalg.norm(first)))
         rows = min(len(first), len(u) + 1)
         count = rows + len(self._stated) + len(pins) + 1
 
         def residual(u: FloatArray) -> FloatArray:
-            evaluation = self.at(u, noise)
+            nonlocal trail
+            trail = self.at(trail, u, noise)
+            evaluation = trail.here
             if not evaluation.ok:
                 missed = (evaluation.status[equations.blocks.pose_of_block] != 0) & ~aside
                 if missed.any():  # worse than any step that is taken
-                    self._refused |= missed
+                    refused[missed] = True
                     return np.full(count, worse + floor)
             turned = np.zeros(rows)
             turned[0] = np.linalg.norm(loss.residual(data(evaluation)))
@@ -217,18 +261,18 @@ class Search:
         taken: Evaluation | None = None
         still = np.zeros((1, len(u)))  # the derivative of `floor`
 
-        def take(evaluation: Evaluation) -> None:
+        def take() -> Evaluation:
             """A step goes on from here."""
-            nonlocal taken
-            if evaluation is not taken:
-                taken = evaluation
-                self.near.cache.pop("following", None)
-                self.near = evaluation
-                self.history.append(progress(equations, evaluation))
+            nonlocal taken, trail
+            if trail.here is not taken:
+                taken = trail.here
+                trail = trail.after(taken, progress(equations, taken))
+            return trail.here
 
         def jacobian(u: FloatArray) -> FloatArray:
-            evaluation = self.at(u, noise)
-            take(evaluation)
+            nonlocal trail
+            trail = self.at(trail, u, noise)
+            evaluation = take()
             whitened = data(evaluation)
             left, factor = -loss.residual(whitened), np.zeros((0, 1 + len(u)))
             for blocks, some, by_u in self._batches(evaluation, noise):
@@ -238,9 +282,10 @@ class Search:
             turned = _turned(factor)
             return np.concatenate([turned, self.prior(evaluation.theta), pins, still])
 
-        found, cost, self.converged = self._searched(residual, jacobian, u)
-        take(self.at(found, noise))
-        return found, cost
+        found, cost, converged = self._searched(residual, jacobian, u)
+        trail = self.at(trail, found, noise)
+        take()
+        return replace(trail, converged=converged), found, cost, refused
 
     def _searched(
         self, residual: Function, jacobian: Function, u: FloatArray

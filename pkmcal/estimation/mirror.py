@@ -14,6 +14,7 @@ import numpy as np
 from pkmcal.arrays import BoolArray, FloatArray
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.evaluation import Evaluation
+from pkmcal.estimation.misfits import rounding
 from pkmcal.kinematics.robot import Robot
 from pkmcal.screw import from_pose, to_pose
 
@@ -53,7 +54,7 @@ def mirror_fits(equations: Equations, evaluation: Evaluation, noise: FloatArray)
         image = equations
         states = evaluation.onward.at_poses(np.arange(len(pose)), pose)
         if image.squares_ahead(theta, noise, states) > _FAR * (
-            cost + equations.rounding(noise) ** 2
+            cost + rounding(equations, noise) ** 2
         ):
             continue
         there = image.at(theta, noise, states)

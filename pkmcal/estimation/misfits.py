@@ -10,6 +10,8 @@ from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.pose_system import PoseSystem
 from pkmcal.measurements.measurements import Measurements
 
+_ROUNDING = 2e-15  # of the largest value: the error of a solved pose
+
 
 def worst_readings(equations: Equations, pose: FloatArray, theta: FloatArray) -> FloatArray:
     """How far off the worst reading at each pose (K, 6) is, mm (K,); inf without a pose.
@@ -67,7 +69,7 @@ def worst_closures(equations: Equations, evaluation: Evaluation) -> FloatArray:
     system = equations.system
     if system is None:
         return np.full(len(equations.actuators), np.nan)
-    off = np.abs(_closures_off(system, evaluation))
+    off: FloatArray = np.abs(_closures_off(system, evaluation))
     off[system.blocks.slack[:, : off.shape[1]]] = 0.0
     worst: FloatArray = off.max(axis=1)
     return worst
@@ -86,6 +88,29 @@ def _closures_off(system: PoseSystem, evaluation: Evaluation) -> FloatArray:
     closures = system.closures
     off: FloatArray = system.readings_off(evaluation) * closures.lengths(evaluation.machines)
     return off[:, : closures.equations - closures.cells]
+
+
+def rounding(equations: Equations, noise: FloatArray) -> float:
+    """Length of the whitened rounding errors of what is predicted, for noise (G,)."""
+    length, readings, sigma = equations.parameters.robot.length, 0.0, equations.closures.sigma
+    if equations.system is None or equations.whitening.any_read:
+        parts = [_rounded(m, length) for m in equations.sets]
+        readings = float(np.linalg.norm(equations.whitening.whitened(parts, noise)))
+    if equations.system is None or sigma is None:
+        return readings
+    size = _ROUNDING * float(np.abs(equations.actuators).max())
+    whitened = size / (noise[equations.system.blocks.groups] * sigma)
+    return float(np.hypot(readings, np.linalg.norm(whitened)))
+
+
+def _rounded(measured: Measurements, length: float) -> FloatArray:
+    """Rounding errors (N, k) of what is predicted, mm and rad."""
+    values = measured.values.reshape(len(measured), -1)
+    lengths = np.array([unit == "mm" for unit in measured.units], dtype=bool)
+    size = np.max(np.nan_to_num(np.abs(values[:, lengths])), initial=0.0) + length
+    return np.broadcast_to(
+        _ROUNDING * size / measured.instrument.mm(measured, length), values.shape
+    )
 
 
 def of_read(measured: Measurements, residual: FloatArray) -> FloatArray:

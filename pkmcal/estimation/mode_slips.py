@@ -15,6 +15,7 @@ from pkmcal.display import first_rows
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.misfits import worst_readings
+from pkmcal.estimation.row_states import RowStates
 from pkmcal.kinematics.robot import Robot
 
 _GROSS = 6.0  # times the median misfit from which a row is tried in other modes
@@ -31,15 +32,18 @@ def in_their_modes(equations: Equations, evaluation: Evaluation) -> Evaluation:
     better, poses = _better(equations, evaluation)
     if not len(better):
         return evaluation
-    states = evaluation.onward.at_poses(better, poses)
+    states = evaluation.begun.at_poses(better, poses)
     return equations.at(evaluation.theta, near=states)
 
 
 def start_in_modes(
-    equations: Equations, near: FloatArray | None = None, own: BoolArray | None = None
+    equations: Equations,
+    near: FloatArray | None = None,
+    own: BoolArray | None = None,
+    states: RowStates | None = None,
 ) -> Evaluation:
     """`Equations.start`, once more where rows in other modes had moved unknown frames."""
-    start = equations.start(near, own)
+    start = equations.start(near, own, states)
     better = in_their_modes(equations.with_parameters(start.parameters), start)
     return start if better is start else equations.start(near, own, better.begun)
 

@@ -77,8 +77,8 @@ class PoseSystem:
         cache["system"] = self, noise, found
         return found
 
-    def by_parameters(self, evaluation: Evaluation, noise: FloatArray) -> tuple[int, FloatArray]:
-        """How many blocks there are, and the derivative (M, n) of their reduced equations."""
+    def by_parameters(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
+        """Derivative (M, n) of what is predicted by the parameters, whitened and reduced."""
         p, blocks = self.prediction.parameters, self.blocks
         columns = self.prediction.table.machine_columns
         of_closures = self.closures.by_numbers(
@@ -91,7 +91,7 @@ class PoseSystem:
             by_all = np.concatenate([by_all, self.whitening.whiten(of_readings, noise)])
         by_unknown = self.at(evaluation, noise).by_unknown
         found, evaluation.cache["following"] = blocks.elimination.reduced(by_unknown, by_all)
-        return len(blocks.components), found
+        return found
 
     def by_groups(
         self,

@@ -14,9 +14,12 @@ from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.parameters import Parameters
 from pkmcal.estimation.pose_table import PoseTable, pose_table
+from pkmcal.estimation.row_states import RowStates
 from pkmcal.estimation.session_machines import SessionClosures
 from pkmcal.estimation.sessions import NONE, ParameterMap
+from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.calibratable import Calibratable
+from pkmcal.readings import joint_angles, orientation
 from pkmcal.readings.reading import At, Predicted, joined
 
 _BATCH = 1024  # rows whose derivatives by the parameters are made at once, as many as caches hold
@@ -139,6 +142,39 @@ class Prediction:
                 for tool in np.unique(first).tolist():
                     found.setdefault(tool, {})[i] = np.flatnonzero(first == tool)
         return found
+
+    @cached_property
+    def guess(self) -> RowStates:
+        """Where a search for the poses begins: at home, or where they were read."""
+        table = self.table
+        guess = np.tile(self.parameters.robot.home, (len(table.actuators), 1))
+        every = zip(table.sets, table.pose_of, self.arguments, strict=True)
+        for measured, place, arguments in every:
+            elsewhere = arguments.framed or "tool" in arguments.columns
+            if measured.kind in ("pose", "position") and not elsewhere:
+                known = np.isfinite(measured.values)
+                ever = np.flatnonzero(known.any(axis=0))  # not across a plane, say
+                read = np.flatnonzero(known[:, ever].all(axis=1))
+                values = measured.values[np.ix_(read, ever)]
+                if 5 in ever:  # angles are read together
+                    values[:, -3:] = orientation.shortest(values[:, -3:])
+                guess[np.ix_(place[read], ever)] = values
+        return RowStates(guess, table.actuators, np.zeros(len(guess), dtype=np.int32))
+
+    def refuse_free_poses(self) -> None:
+        """Refuse effects, and readings of joints and between poses, where poses have unknowns."""
+        if any(arguments.effects for arguments in self.arguments):
+            raise ArgumentError(
+                "expansion: needs poses that follow from the actuators: no actuator_sigma, and"
+                " no surplus actuators; found others"
+            )
+        for m in self.table.sets:
+            follows = m.joint and joint_angles.follows_pose(self.parameters.robot, m.joint)
+            if m.kind in ("between", "angle") and not follows:
+                raise ArgumentError(
+                    f"measurements: readings of kind {m.kind!r} need poses that follow from the"
+                    " actuators: no actuator_sigma, and no surplus actuators"
+                )
 
     def arguments_of(self, i: int, theta: FloatArray) -> dict[str, FloatArray]:
         """What readings of set `i` depend on beside the pose, (N, w) each, for `predict`."""

@@ -51,6 +51,12 @@ class RowBlocks:
         """Family of each group (G,): the set."""
         return np.arange(len(self.unstated))
 
+    def squares(self, residual: FloatArray) -> FloatArray:
+        """Squared length of the residuals (M,) of each block, (B,)."""
+        first = np.cumsum(self.components) - self.components
+        squares: FloatArray = np.add.reduceat(residual**2, first)
+        return squares
+
 
 @dataclass(frozen=True, eq=False)
 class PoseBlocks(RowBlocks):

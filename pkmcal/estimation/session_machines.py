@@ -83,6 +83,8 @@ class SessionClosures:
         Of each machine.
     rows : sequence of ndarray of int
         The poses that are its own.
+    shift : ndarray (K, equations), optional
+        By how much whitened equations are larger: of other readings.
 
     Attributes
     ----------
@@ -98,8 +100,13 @@ class SessionClosures:
         How many of the equations are of load cells: the last ones.
     """
 
-    def __init__(self, parts: Sequence[Closures], rows: Sequence[IntArray]) -> None:
-        self._parts, self._rows = tuple(parts), tuple(rows)
+    def __init__(
+        self,
+        parts: Sequence[Closures],
+        rows: Sequence[IntArray],
+        shift: FloatArray | None = None,
+    ) -> None:
+        self._parts, self._rows, self._shift = tuple(parts), tuple(rows), shift
         self.unknowns, self.equations = parts[0].unknowns, parts[0].equations
         if any((p.unknowns, p.equations) != (self.unknowns, self.equations) for p in parts):
             raise ArgumentError(
@@ -129,12 +136,14 @@ class SessionClosures:
         """The equations (K, equations), whitened, and their derivative by the unknowns."""
         found = [part.residual(robot, own) for part, robot, own in self._each(machines, states)]
         off, by_unknown = zip(*found, strict=True)
-        return _joined(off, self._rows), _joined(by_unknown, self._rows)
+        whole = _joined(off, self._rows)
+        whole = whole if self._shift is None else whole + self._shift
+        return whole, _joined(by_unknown, self._rows)
 
     def shifted(self, by: FloatArray) -> SessionClosures:
-        """The same with whitened equations (K, equations) that are larger: of other readings."""
-        parts = [part.shifted(by[own]) for part, own in zip(self._parts, self._rows, strict=True)]
-        return SessionClosures(parts, self._rows)
+        """The closures of other readings: whitened equations (K, equations) are larger."""
+        shift = by if self._shift is None else self._shift + by
+        return SessionClosures(self._parts, self._rows, shift)
 
     def lengths(self, machines: Machines) -> FloatArray:
         """Factors (equations,) to mm of the equations times their sigma."""

@@ -9,7 +9,6 @@ from __future__ import annotations
 import numpy as np
 
 from pkmcal.arrays import FloatArray
-from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.estimate import Estimate
 from pkmcal.estimation.estimator import FEW, Estimator
 from pkmcal.statistics.distributions import chi2_tail
@@ -34,34 +33,17 @@ def slipped(estimator: Estimator, estimate: Estimate) -> FloatArray:
     common = 1.0 if unstated.any() else float(squares.sum() / max(freedom.sum(), 1e-9))
     if not common > 0.0:
         return ratios  # no residual at all
-    rows, set_of = equations.squares(estimate.residual), equations.set_of
+    rows, set_of = equations.blocks.squares(estimate.residual), equations.set_of
     for i in np.flatnonzero(~unstated & (freedom >= FEW)):
         above = chi2_tail(float(squares[i]) / common, float(freedom[i]))
         components = equations.components[set_of == i]
         median = median_ratio(rows[set_of == i], components) * components.sum() / freedom[i]
         half = float(np.sqrt(median / common))  # of the rows: outliers are no slip
-        if min(above, 1.0 - above) < _CHANCE / 2.0 and _apart(half):
+        if min(above, 1.0 - above) < _CHANCE / 2.0 and apart(half):
             ratios[i] = np.sqrt(squares[i] / freedom[i])
     return ratios if ratios.max() > _APART * ratios.min() else np.ones_like(ratios)
 
 
-def _apart(ratio: float) -> bool:
+def apart(ratio: float) -> bool:
     """Whether a ratio of deviations matters; 0 where a set has no residual at all."""
     return ratio > _APART or ratio * _APART < 1.0
-
-
-def unlike_noise(equations: Equations, ratios: FloatArray, with_outliers: bool) -> list[str]:
-    """Name the sets whose sigma is wrong beside that of the others."""
-    names = [
-        "touch_distances" if m.kind == "touch-distance" else f"measurements {i + 1}"
-        for i, m in enumerate(equations.sets)
-    ]
-    wrong = [i for i, ratio in enumerate(ratios.tolist()) if _apart(ratio)]
-    if not wrong:
-        return []
-    parts = " and ".join(f"{names[i]} are {ratios[i]:.2g}" for i in wrong)
-    return [
-        f"the residuals of {parts} times what sigma says: the sets are weighted wrongly beside each"
-        " other; state the true sigma, or none"
-        + (", or look at the outliers first" if with_outliers else "")
-    ]

@@ -73,7 +73,7 @@ class TensionedPoses(FreePoses):
         self.missing = np.zeros((len(read), self.equations + count), dtype=bool)
         self.missing[:, self.equations :] = np.isnan(cells.read)
         self._cells = np.nan_to_num(cells.read)
-        self._last: tuple[object, RowStates, tuple[FloatArray, FloatArray]] | None = None
+        self._cache: dict[str, tuple[object, RowStates, FloatArray, FloatArray]] = {}
         self._first = filled_tension(cells.read)
         force = 0.0 if load is None else float(np.linalg.norm(load.force))
         largest = max(force, float(np.abs(self._first).max(initial=0.0)), 1.0)
@@ -92,7 +92,11 @@ class TensionedPoses(FreePoses):
         self._turning = [*self._turning, *[False] * count]
         self.actuators = (*self.actuators, *[-1] * count)
         of_cells = np.ones(cells.read.shape) if cells.sigma is None else cells.sigma
-        self._state(np.hstack([np.asarray(self.sigma), of_cells]))
+        self.sigma = np.hstack([np.asarray(self.sigma), of_cells])
+        self._white, self._white_steps = self._whitening(self.sigma)
+
+    def __getstate__(self) -> dict[str, object]:
+        return {**self.__dict__, "_cache": {}}
 
     def settled(self, robot: Calibratable, states: RowStates) -> RowStates:
         """Tensions begin where cells read them, those that were not read at the row's mean."""
@@ -102,11 +106,12 @@ class TensionedPoses(FreePoses):
 
     def _rows(self, robot: Calibratable, states: RowStates) -> tuple[FloatArray, FloatArray]:
         """As for `FreePoses`; kept for the last states, of which a step asks several times."""
-        if self._last is not None and self._last[0] is robot and self._last[1] is states:
-            off, by_step = self._last[2]
+        known = self._cache.get("rows")
+        if known is not None and known[0] is robot and known[1] is states:
+            _, _, off, by_step = known
         else:
             off, by_step = self._rows_at(robot, states)
-            self._last = robot, states, (off, by_step)
+            self._cache["rows"] = robot, states, off, by_step
         return off.copy(), by_step.copy()
 
     def _rows_at(self, robot: Calibratable, states: RowStates) -> tuple[FloatArray, FloatArray]:

@@ -12,6 +12,7 @@ from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.estimate import Estimate
 from pkmcal.estimation.estimator import FEW, Estimator
 from pkmcal.estimation.labels import Labels, labels, poses_of_rows
+from pkmcal.estimation.misfits import rounding
 from pkmcal.estimation.set_noise import slipped
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.statistics.clusters import shared_error_score
@@ -81,7 +82,7 @@ class Uncertainty:
     @cached_property
     def rounded(self) -> bool:
         """Whether the residuals are nothing but rounding errors."""
-        limit = _ROUNDED * self.equations.rounding(self.factors)
+        limit = _ROUNDED * rounding(self.equations, self.factors)
         return bool(np.linalg.norm(self.fit.residual) < limit)
 
     @property

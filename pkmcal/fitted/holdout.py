@@ -152,7 +152,7 @@ def evaluate(
     rows = later(estimator.equations.parameters, held)
     whole = rows.equations(estimator.equations)
     before = whole.with_exact_actuators().start(rows.at(estimator.start.theta), rows.own)
-    equations, after, own = compared(rows, whole, estimate, uncertainty)
+    equations, after, own = compared(rows, whole, estimate, uncertainty, before.begun)
     rows = replace(rows, parameters=equations.parameters)  # their own frames have been laid
     named = labels(equations)
     points = _points(rows, equations, after, named, own, uncertainty)

@@ -21,6 +21,7 @@ from pkmcal.estimation.least_squares import Search
 from pkmcal.estimation.loss import Loss
 from pkmcal.estimation.mode_slips import in_their_modes, start_in_modes
 from pkmcal.estimation.parameters import Parameters
+from pkmcal.estimation.row_states import RowStates
 from pkmcal.estimation.sessions import NONE
 from pkmcal.estimation.uncertainty import Uncertainty
 from pkmcal.statistics.linear_fit import ROUNDING
@@ -126,17 +127,17 @@ class OwnNumbers:
 
 
 def compared(
-    rows: Later, whole: Equations, estimate: Estimate, sure: Uncertainty
+    rows: Later, whole: Equations, estimate: Estimate, sure: Uncertainty, near: RowStates
 ) -> tuple[Equations, Evaluation, OwnNumbers | None]:
     """The rows at the fit, poses following from the actuators, and what they say of own parameters.
 
     None where they have none. Where poses have unknowns, closures speak of them as well as readings
-    (`whole`).
+    (`whole`). The search for the poses begins `near` where those of the start were found.
     """
     commanded, theta = whole.with_exact_actuators(), rows.at(estimate.evaluation.theta)
     if not rows.own.any():
-        return commanded, in_their_modes(commanded, commanded.at(theta)), None
-    whole, start = whole.begin(start_in_modes(commanded, theta, rows.own))
+        return commanded, in_their_modes(commanded, commanded.at(theta, near=near)), None
+    whole, start = whole.begin(start_in_modes(commanded, theta, rows.own, near))
     found, own = _own_numbers(rows, whole, start, estimate, sure)
     commanded = whole.with_exact_actuators()
     return commanded, commanded.at(found.theta, near=found), own
@@ -154,7 +155,8 @@ def _own_numbers(
         width = np.full(len(equations.components), float(np.median(loss.width)))
         same = Loss(loss.name, equations.components, width)
         none = np.zeros((0, len(columns)))
-        found = search.at(search.best(np.zeros(len(columns)), noise, same, none), noise)
+        u, trail = search.best(search.begin(), np.zeros(len(columns)), noise, same, none)
+        found = search.at(trail, u, noise).here
         jacobian = search.jacobian(found, noise)
     left, singular, right = np.linalg.svd(
         np.vstack([jacobian, search.prior(found.theta)]), full_matrices=False

@@ -137,7 +137,8 @@ def _without_each(
 def _squares(equations: Equations, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
     """Squared residuals of each pose (K,)."""
     found = np.zeros(len(equations.actuators))
-    found[equations.blocks.pose_of_block] = equations.squares(equations.residual(evaluation, noise))
+    blocks = equations.blocks
+    found[blocks.pose_of_block] = blocks.squares(equations.residual(evaluation, noise))
     return found
 
 

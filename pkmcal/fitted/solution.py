@@ -106,8 +106,6 @@ class Solution(ParameterTable, Identifiability, Misfit, Repeats, HeldOut):
         How often the forward kinematics of all rows were solved.
     history : tuple of float
         Misfit rms in mm at the start and after each step of the search.
-    warnings : tuple of str
-        What looks wrong with measurements or result.
     prior_test : PriorTest or None
         Whether the measurements contradict the prior, where there is one.
     robots : mapping of str to Robot or SerialArm
@@ -128,7 +126,6 @@ class Solution(ParameterTable, Identifiability, Misfit, Repeats, HeldOut):
     converged: bool
     evaluations: int
     history: tuple[float, ...]
-    warnings: tuple[str, ...] = ()
     prior_test: PriorTest | None = None
     robots: Mapping[str, Robot | SerialArm] = field(default_factory=dict)
     datum: Datum = NO_DATUM

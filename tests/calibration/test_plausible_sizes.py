@@ -8,7 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pkmcal.diagnostics.plausibility import distant_points, implausible_changes, shrunk
+from pkmcal.diagnostics.machine import CHECKS
+
+CHECK = {check.name: check for check in CHECKS}
+
+
+def said(name: str, **fit: Any) -> list[str]:
+    """What a check says of a calibration of which only some parts matter."""
+    found: Any = SimpleNamespace(fit=SimpleNamespace(**fit))
+    return [CHECK[name].say(found, finding) for finding in CHECK[name].run(found)]
 
 
 def evaluated(places: np.ndarray) -> Any:
@@ -34,7 +42,8 @@ def test_poses_that_touch_closer_together_than_before_are_said(
     sets = [SimpleNamespace(kind=kind) for kind in kinds]
     places = np.split(np.arange(len(before)), len(kinds))
     equations: Any = SimpleNamespace(sets=sets, pose_of=places)
-    found = shrunk(equations, evaluated(before), evaluated(after))
+    start, end = evaluated(before), evaluated(after)
+    found = said("shrunk", equations=equations, start=start, end=end)
     alone = kinds[0] == "touch" and kinds[-1] != "distance"
     assert len(found) == (share > 0.02 and alone)
     assert all(f"lie {100 * share:.2g} % closer" in text for text in found)
@@ -65,7 +74,7 @@ def test_a_target_is_far_beyond_thrice_the_largest_of_reach_size_and_geometry(wh
         )
         end = evaluated(places)
         end.theta = np.array([1e6, 0, 0, 0, 0, place, 7e3, 0, 0])
-        *found, last = distant_points(end, chosen)
+        *found, last = said("distant-points", end=end, parameters=chosen)
         assert len(found) == far
         assert all(t.startswith("target west of one was found 610 mm") for t in found)
         assert last.startswith("attachment 2 was found 7e+03 mm")
@@ -81,7 +90,8 @@ def test_numbers_that_moved_by_a_quarter_of_the_machine_are_named_but_loads_are_
     chosen: Any = SimpleNamespace(names=names, scale=scale, geometry=slice(0, 5), robot=robot)
     start: Any = SimpleNamespace(theta=np.full(6, 7.0))
     end: Any = SimpleNamespace(theta=7.0 + moved)
-    (text,) = implausible_changes(start, end, chosen)
+    fit = {"parameters": chosen, "start": start, "estimate": SimpleNamespace(evaluation=end)}
+    (text,) = said("implausible-changes", **fit)
     assert text.startswith("gain2, base3.z moved by up to 101 mm")
     end.theta = 7.0 + 0.9 * moved
-    assert implausible_changes(start, end, chosen) == []
+    assert said("implausible-changes", **fit) == []

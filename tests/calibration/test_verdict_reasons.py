@@ -9,11 +9,12 @@ import pytest
 
 import pkmcal as pk
 from pkmcal.calibration.identification import Identification
+from pkmcal.diagnostics.checks import CHECKS
 from pkmcal.diagnostics.displaced import DisplacedTarget
 from pkmcal.diagnostics.drift import Drift
 from pkmcal.diagnostics.measuring_order import MeasuringOrder
 from pkmcal.diagnostics.robust_check import RobustCheck
-from pkmcal.diagnostics.verdict import judge
+from pkmcal.diagnostics.verdict import diagnose
 from pkmcal.fitted.distances import Distances
 from pkmcal.fitted.holdout import HeldOut
 from pkmcal.statistics.holdout_test import HoldoutTest
@@ -29,15 +30,15 @@ def test_points_contradict_a_fit_unless_it_is_a_few_and_the_others_do_not(
 ) -> None:
     """Twelve points, whose rms may be 1.2 times what is expected; a quarter of them is a few."""
     held = HeldOut(
-        expected=0.5,
-        off=np.append(np.ones(12), np.nan),  # one was not reached
-        odd=odd,
-        after=Distances(rms_without_outliers=0.5 * others),
-        test=HoldoutTest(ratio=3.0, median_ratio=2.0, chance=1e-6, freedom=(12.0, 30.0)),
+        holdout_expected=0.5,
+        holdout_off=np.append(np.ones(12), np.nan),  # one was not reached
+        holdout_outliers=odd,
+        holdout_distances=Distances(rms_without_outliers=0.5 * others),
+        holdout_test=HoldoutTest(ratio=3.0, median_ratio=2.0, chance=1e-6, freedom=(12.0, 30.0)),
     )
-    assert held.contradicts == contradicts
+    assert held.holdout_contradicts == contradicts
     agrees = HoldoutTest(ratio=3.0, median_ratio=1.1, chance=1e-6, freedom=(12.0, 30.0))
-    assert not replace(held, test=agrees).contradicts
+    assert not replace(held, holdout_test=agrees).holdout_contradicts
 
 
 @pytest.fixture(scope="module")
@@ -76,11 +77,15 @@ def test_what_may_come_of_another_cause_is_not_said_beside_it(
 
     What is most of what is left is a doubt, the rest a remark.
     """
-    robust = RobustCheck(100.0, 1.0, (int(found.rows[3]),), 0.02) if carried else None
     share, by = (0.9, 5.0) if large else (0.1, 0.5)
-    verdict = judge(
-        found, robust, (), drifted(by) if drift else None, ordered(share), elsewhere(share)
-    )
+    rows = (int(found.rows[3]),)
+    findings = {
+        "rows-disagree": (RobustCheck(100.0, 1.0, rows, 0.02),) if carried else (),
+        "drift": (drifted(by),) if drift else (),
+        "measuring-order": (ordered(share),),
+        "displaced-target": (elsewhere(share),),
+    }
+    verdict = diagnose(found, CHECKS, findings)
     expected = {"drift"} if drift else {"order"} - ({"order"} if carried else set())
     expected |= set() if carried else {"displaced"}
     for texts, mine in ((verdict.reasons, large), (verdict.remarks, not large)):

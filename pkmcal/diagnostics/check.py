@@ -1,0 +1,159 @@
+"""A check of a calibration: what it looks for, what it makes of that, how it says so.
+
+A check is one entry of the tuple `CHECKS` in one of the files that `checks` lists.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, Generic, Literal, TypeVar
+
+from pkmcal.fitted.solution import Solution
+
+F = TypeVar("F")
+Level = Literal["grave", "doubt", "remark"]
+
+_OPTIONS = {  # what the command line says otherwise than `identify`; None: it has no such option
+    ("drop", "outliers"): "--drop-outliers",
+    ("drop", "slack"): "--drop-slack",
+    ("unknown", "target"): "--target unknown",
+    ("fix", "datum"): "--datum auto",
+    ("effects", None): "--expansion",
+    ("bounds", None): None,
+}
+_SEVERAL = (
+    "drop",
+    "fix",
+    "per_session",
+    "unknown",
+)  # arguments that take more beside what they have
+
+
+@dataclass(frozen=True)
+class Remedy:
+    """An argument of `identify` that would help: an option in a sentence, a button in a window.
+
+    Attributes
+    ----------
+    argument : str
+        The name of the argument.
+    value : object
+        The value that it should have; None where the user has to say.
+
+    Examples
+    --------
+    >>> print(Remedy("loss", "cauchy"))
+    --loss cauchy (loss='cauchy')
+    >>> Remedy("drop", (4, 17)).option
+    '--drop 4,17'
+    >>> Remedy("drop", "outliers").applied({"drop": (3,), "holdout": 0.2})
+    {'drop': (3, 'outliers'), 'holdout': 0.2}
+    """
+
+    argument: str
+    value: Any = None
+
+    def applied(self, arguments: Mapping[str, Any]) -> dict[str, Any]:
+        """Arguments of `identify` with this one, beside what it had where it takes several."""
+        before = arguments.get(self.argument)
+        value = self.value
+        if self.argument in _SEVERAL and before is not None:
+            value = tuple(dict.fromkeys((*_listed(before), *_listed(value))))
+        return {**arguments, self.argument: value}
+
+    @property
+    def option(self) -> str | None:
+        """The option of ``pkmcal calibrate``; None where it has none."""
+        several = isinstance(self.value, tuple)
+        if not several and (self.argument, self.value) in _OPTIONS:
+            return _OPTIONS[self.argument, self.value]
+        name = f"--{self.argument.replace('_', '-')}"
+        if self.value is None:
+            return name
+        if not several:
+            return f"{name} {self.value}"
+        if all(isinstance(each, str) for each in self.value):
+            return " ".join(f"{name} {each!r}" for each in self.value)
+        return f"{name} {','.join(map(str, self.value))}"
+
+    def __str__(self) -> str:
+        several = isinstance(self.value, tuple)
+        shown = "" if self.value is None else repr(list(self.value) if several else self.value)
+        if several and len(self.value) == 1 and isinstance(self.value[0], str):
+            shown = repr(self.value[0])
+        python = f"{self.argument}={shown}"
+        return python if self.option is None else f"{self.option} ({python})"
+
+
+def _listed(value: Any) -> tuple[Any, ...]:
+    return (value,) if isinstance(value, str) else tuple(value)
+
+
+@dataclass(frozen=True)
+class Said:
+    """What one check says of a calibration.
+
+    Attributes
+    ----------
+    check : str
+        The name of the check.
+    level : {"grave", "doubt", "remark"}
+        What it makes of the result: no calibration, a doubtful one, neither.
+    text : str
+        One sentence: the cause, its size, the cure.
+    finding : object
+        The numbers behind it.
+    remedies : tuple of Remedy
+        What would help, as data.
+    """
+
+    check: str
+    level: Level
+    text: str
+    finding: Any = None
+    remedies: tuple[Remedy, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Check(Generic[F]):
+    """One thing that may be wrong with a calibration.
+
+    Attributes
+    ----------
+    name : str
+        By which other checks, files and windows refer to it.
+    about : str
+        What it looks for: a line of the table in the documentation.
+    run : callable (found) -> iterable
+        Look, and return what was seen: nothing, one finding or several.
+    say : callable (found, finding) -> str
+        One sentence on a finding: the cause, its size, the cure.
+    levels : tuple of {"grave", "doubt", "remark"}
+        What a finding makes of the result.
+    level_of : callable (found, finding) -> level or None, optional
+        Which of several levels a finding has; None where it is not worth a word.
+    remedies : callable (found, finding) -> tuple of Remedy, optional
+        What would help.
+    unless : tuple of str
+        Checks and levels that explain what this one would say: where one of them speaks, it does
+        not.
+    at_once : bool
+        Whether `identify` warns of it. The others may take time, and are made when somebody asks
+        for the verdict.
+    """
+
+    name: str
+    about: str
+    run: Callable[[Solution], Iterable[F]]
+    say: Callable[[Solution, F], str]
+    levels: tuple[Level, ...] = ("doubt",)
+    level_of: Callable[[Solution, F], Level | None] | None = None
+    remedies: Callable[[Solution, F], tuple[Remedy, ...]] | None = None
+    unless: tuple[str, ...] = ()
+    at_once: bool = False
+
+
+def at_most_one(finding: F | None) -> tuple[F, ...]:
+    """What `run` returns of a finding that there may be."""
+    return () if finding is None else (finding,)

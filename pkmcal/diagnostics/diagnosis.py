@@ -1,0 +1,97 @@
+"""What all checks say of one calibration, and which of them keep silent beside others."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, MutableMapping, Sequence
+from graphlib import TopologicalSorter
+from typing import Any, get_args
+
+from pkmcal.diagnostics.check import Check, Level, Said
+from pkmcal.display import printable
+from pkmcal.fitted.solution import Solution
+
+_LEVELS: tuple[Level, ...] = get_args(Level)
+_LONGEST = 1000  # letters of a sentence: names that a user gave may be in it
+
+
+class Diagnosis:
+    """The findings of some checks, each made once and when it is asked for.
+
+    Parameters
+    ----------
+    found : Solution
+        The calibration.
+    checks : sequence of Check
+        In the order in which they speak; `Check.unless` says in which they are made.
+    findings : mutable mapping of str to tuple
+        Findings that were made already, by the names of their checks; others are added.
+    """
+
+    def __init__(
+        self,
+        found: Solution,
+        checks: Sequence[Check[Any]],
+        findings: MutableMapping[str, tuple[Any, ...]],
+    ) -> None:
+        self._found = found
+        self._checks = {check.name: check for check in checks}
+        self._findings = findings
+
+    def findings(self, name: str) -> tuple[Any, ...]:
+        """What a check saw, worth a word or not, and whatever other checks say."""
+        if name not in self._findings:
+            self._findings[name] = tuple(self._checks[name].run(self._found))
+        return self._findings[name]
+
+    def said(self) -> tuple[Said, ...]:
+        """What the checks say, in their order."""
+        return tuple(said for check in self._checks.values() for said in self._said_by(check))
+
+    def _said_by(self, check: Check[Any]) -> Iterator[Said]:
+        others = ((one, other) for other in check.unless for one in self._meant(check, other))
+        if any(other in (said.check, said.level) for one, other in others for said in one):
+            return
+        found = self._found
+        for finding in self.findings(check.name):
+            level = check.levels[0] if check.level_of is None else check.level_of(found, finding)
+            if level is None:
+                continue
+            text = printable(check.say(found, finding), _LONGEST)
+            remedies = () if check.remedies is None else check.remedies(found, finding)
+            yield Said(check.name, level, text, finding, remedies)
+
+    def _meant(self, check: Check[Any], other: str) -> Iterator[Iterator[Said]]:
+        for one in meant(self._checks.values(), check, other):
+            yield self._said_by(one)
+
+
+def meant(checks: Iterable[Check[Any]], check: Check[Any], other: str) -> list[Check[Any]]:
+    """The checks that an entry of `unless` means: one by its name, or those of a level."""
+    return [one for one in checks if one is not check and other in (one.name, *one.levels)]
+
+
+def verified(checks: Sequence[Check[Any]]) -> tuple[Check[Any], ...]:
+    """The checks, if their names, levels and `unless` agree.
+
+    Raises
+    ------
+    ValueError
+        A name that two checks have; an `unless` that names no check and no level; checks that wait
+        for each other; one that is made at once and waits for one that is not; several levels, and
+        nothing that says which.
+    """
+    names = [check.name for check in checks]
+    graph: dict[str, set[str]] = {}
+    for check in checks:
+        if names.count(check.name) > 1:
+            raise ValueError(f"{check.name}: two checks have this name")
+        if unknown := sorted(set(check.unless) - {*names, *_LEVELS}):
+            raise ValueError(f"{check.name}: unless names no check: {', '.join(unknown)}")
+        if not check.levels or (len(check.levels) > 1 and check.level_of is None):
+            raise ValueError(f"{check.name}: level_of must say which of {check.levels} it is")
+        before = [one for other in check.unless for one in meant(checks, check, other)]
+        if slow := [one.name for one in before if check.at_once and not one.at_once]:
+            raise ValueError(f"{check.name}: made at once, it cannot wait for {', '.join(slow)}")
+        graph[check.name] = {one.name for one in before}
+    tuple(TopologicalSorter(graph).static_order())  # a circle is a CycleError, a ValueError
+    return tuple(checks)

@@ -1,0 +1,153 @@
+"""What points that were held out say against the fit."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray
+from pkmcal.diagnostics.check import Check, Level, Remedy, at_most_one
+from pkmcal.diagnostics.moved import Moved, moved
+from pkmcal.display import chance_text, decimals, displayed, fixed
+from pkmcal.estimation.estimator import FEW, LEAST_FREEDOM
+from pkmcal.fitted.row_names import row_names
+from pkmcal.fitted.solution import Solution
+from pkmcal.measurements.measurements import Measurements
+from pkmcal.statistics.holdout_test import RATIO
+
+
+def _contradiction(found: Solution, chance: float) -> str:
+    return (
+        f"the held-out points contradict the fit: {found.holdout_rms:.3g} mm rms where"
+        f" {found.holdout_expected:.3g} mm is expected ({chance_text(chance)})"
+    )
+
+
+def _without_outliers(found: Solution) -> float:
+    return found.holdout_distances.rms_without_outliers
+
+
+def _level_of_few(found: Solution, rows: tuple[int, ...]) -> Level:
+    return "doubt" if _without_outliers(found) > RATIO * found.holdout_expected else "remark"
+
+
+def _few_off(found: Solution, rows: tuple[int, ...]) -> str:
+    them, are = ("them", "s are") if len(rows) > 1 else ("it", " is")
+    return (
+        f"{len(rows)} held-out point{are} off: {row_names(found.holdout_data, rows)}; without"
+        f" {them} the rms is {_without_outliers(found):.3g} mm,"
+        f" {found.holdout_expected:.3g} mm is expected"
+    )
+
+
+def _drop(found: Solution, rows: tuple[int, ...]) -> tuple[Remedy, ...]:
+    return (Remedy("drop", rows if found.holdout_drawn else "outliers"),)
+
+
+def _moved(found: Solution) -> tuple[tuple[Moved, ...], ...]:
+    """What moved; nothing where points were drawn, or agree with a fit of spare equations."""
+    later, end, sure = found.holdout_later, found.holdout_end, found.fit.uncertainty
+    if not found.holdout_contradicts and sure.fit.freedom >= FEW:
+        return ()
+    if found.holdout_drawn or later is None or end is None or not sure.known:
+        return ()
+    return at_most_one(moved(found.fit, later, end) or None)
+
+
+def _anew(several: tuple[Moved, ...]) -> Remedy:
+    return Remedy("per_session", tuple(dict.fromkeys(each.per_session for each in several)))
+
+
+def _moved_text(found: Solution, several: tuple[Moved, ...]) -> str:
+    parts = []
+    for each in several:
+        sizes = ", ".join(map(_size, each.shift, each.stderr, each.units))
+        also = f" (or as well {', '.join(each.also)})" if each.also else ""
+        parts.append(f"{each} by {sizes}{also}")
+    return (
+        "between the fitted and the held-out points moved, or the model is wrong there:"
+        f" {'; '.join(parts)}; {_anew(several)} finds such numbers anew in each session"
+    )
+
+
+def _size(shift: float, sigma: float, unit: str) -> str:
+    """A shift with its standard deviation, in the unit people read."""
+    value, shown = displayed(shift, unit)
+    deviation, _ = displayed(sigma, unit)
+    places = decimals(deviation)
+    sign, behind = "+" if value >= 0 else "", f" {shown}" if shown != "1" else ""
+    return f"{sign}{fixed(value, places)} ± {fixed(deviation, places)}{behind}"
+
+
+def _fitted_again(found: Solution) -> int:
+    """How many rows were held out at actuators where others were fitted."""
+    held = [row.tobytes() for data in found.holdout_data for row in _commands(data.measured)]
+    sought = set(held)
+    fitted = {
+        key
+        for m in found.fit.equations.sets
+        for row in (_commands(m) if sought else ())
+        if (key := row.tobytes()) in sought
+    }
+    return sum(key in fitted for key in held)
+
+
+def _commands(measured: Measurements) -> FloatArray:
+    """Actuators of each row, at both ends where there are two."""
+    parts = [measured.actuators] + ([] if measured.other is None else [measured.other])
+    return np.hstack(parts) + 0.0
+
+
+CHECKS = (
+    Check(
+        name="holdout-contradicts",
+        about="held-out points are further off than noise and covariance explain",
+        run=lambda found: at_most_one(found.holdout_chance if found.holdout_contradicts else None),
+        say=_contradiction,
+    ),
+    Check(
+        name="holdout-few-off",
+        about="a few held-out points are off, the others are not, or not much",
+        unless=("holdout-contradicts",),
+        levels=("doubt", "remark"),
+        run=lambda found: at_most_one(found.holdout_outliers or None),
+        level_of=_level_of_few,
+        say=_few_off,
+        remedies=_drop,
+    ),
+    Check(
+        name="moved",
+        about="numbers moved between the fitted measurements and others that were held out",
+        run=_moved,
+        say=_moved_text,
+        remedies=lambda found, several: (_anew(several),),
+    ),
+    Check(
+        name="holdout-fitted-again",
+        about="points were held out at poses where others were fitted",
+        levels=("remark",),
+        run=lambda found: at_most_one(_fitted_again(found) or None),
+        say=lambda found, count: (
+            f"{count} of the held-out points are at poses that were fitted as well: they show how"
+            " these repeat, not how good the machine is elsewhere"
+        ),
+    ),
+    Check(
+        name="holdout-unreached",
+        about="the machine does not reach rows that were held out",
+        at_once=True,
+        run=lambda found: at_most_one(found.holdout_unreached or None),
+        say=lambda found, failures: f"holdout: {failures}; left out",
+    ),
+    Check(
+        name="holdout-nothing-left",
+        about="a held-out session's own numbers take all of its readings",
+        at_once=True,
+        run=lambda found: at_most_one(
+            len(found.holdout_own) if found.holdout_spare < LEAST_FREEDOM else None
+        ),
+        say=lambda found, count: (
+            f"holdout: {count} numbers of its own session take all of its readings, nothing is"
+            " left to compare; hold out more rows of it"
+        ),
+    ),
+)

@@ -1,0 +1,216 @@
+"""Whether what was found is a machine as it can be: sizes, strokes, assembly modes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from pkmcal.arguments import instance
+from pkmcal.arrays import BoolArray, FloatArray, rms
+from pkmcal.diagnostics.check import Check, Remedy, at_most_one
+from pkmcal.display import first_rows, printable
+from pkmcal.estimation.evaluation import Evaluation
+from pkmcal.estimation.identifiability import listed
+from pkmcal.estimation.mode_slips import in_other_modes
+from pkmcal.fitted.solution import Solution
+from pkmcal.geometry.load import is_of_load
+from pkmcal.kinematics.robot import Robot
+
+FAR = 0.25  # share of the machine's size by which errors of manufacture do not move a parameter
+_BEYOND = 0.01  # share of a stroke by which errors of a machine may carry it beyond its ends
+_SHRUNK = 0.02  # share of its size by which errors of manufacture do not shrink a machine
+_REMOTE = 3.0  # times a machine's reach within which a point of its platform is
+_NO_LENGTH = {"touch", "orientation", "tilt", "angle", "closure"}  # kinds that read none
+
+
+def far_numbers(found: Solution) -> dict[str, float]:
+    """Numbers of the geometry that moved further than errors of manufacture explain, and how far.
+
+    In mm at the machine; numbers of a load may be anything.
+    """
+    chosen = found.fit.parameters
+    change = found.fit.estimate.evaluation.theta - found.fit.start.theta
+    moved = np.abs(change / chosen.scale)[chosen.geometry]
+    moved[[is_of_load(name) for name in chosen.names[chosen.geometry]]] = 0.0
+    far = np.flatnonzero(moved > FAR * chosen.robot.length)
+    return {chosen.names[i]: float(moved[i]) for i in far}
+
+
+class DistantPoint(NamedTuple):
+    """A point of the platform, and how far from its origin it was found, mm."""
+
+    role: str
+    name: str
+    distance: float
+
+
+def _platform_size(found: Solution) -> float:
+    """How far from its origin a point of the platform may be, mm."""
+    robot = found.fit.parameters.robot
+    reach = float(np.linalg.norm(found.fit.end.pose[:, :3], axis=1).max())
+    geometry = robot.geometry
+    lengths = np.abs(geometry.values[np.array(geometry.units) == "mm"]).max(initial=0.0)
+    return _REMOTE * max(reach, robot.length, float(lengths))
+
+
+def _distant_points(found: Solution) -> Iterator[DistantPoint]:
+    """Points that were sought near the platform and found far away.
+
+    Poses that hardly turn do not determine where a target is; noise may then carry it anywhere.
+    """
+    parameters, theta = found.fit.parameters, found.fit.end.theta
+    size = _platform_size(found)
+    for (role, point), number in parameters.found_along.items():
+        if role not in ("target", "attachment"):
+            continue
+        for first in np.flatnonzero(parameters.number_of == number).tolist():
+            place = theta[first : first + 3]
+            moved = float(np.linalg.norm(place - parameters.start[first : first + 3]))
+            far = float(np.linalg.norm(place))
+            if min(moved, far) > size:
+                behind = parameters.names[first].partition("@")[2]
+                name = f"{point} of {printable(behind)}" if behind else point
+                yield DistantPoint(role, name, far)
+
+
+def _distant_text(found: Solution, point: DistantPoint) -> str:
+    return (
+        f"{point.role} {point.name} was found {point.distance:.3g} mm from the platform's origin,"
+        f" beyond the machine's size ({_platform_size(found):.0f} mm): measure poses that turn"
+        " more, or state where it is"
+    )
+
+
+def _shrunk(found: Solution) -> tuple[float, ...]:
+    """By which share poses lie closer together, where touches alone say how large the machine is.
+
+    Touches of a point, a line or a plane do not: a smaller machine makes all their misfits smaller.
+    """
+    fit = found.fit
+    kinds = {measured.kind for measured in fit.equations.sets}
+    pairs = zip(fit.equations.sets, fit.equations.pose_of, strict=True)
+    touching = [place for measured, place in pairs if measured.kind == "touch"]
+    if not kinds <= _NO_LENGTH or not touching:
+        return ()
+    rows = np.concatenate(touching)
+    spans = []
+    for evaluation in (fit.start, fit.end):
+        places = evaluation.pose[rows, :3]
+        spans.append(rms(np.linalg.norm(places - places.mean(axis=0), axis=1)))
+    share = 1.0 - spans[1] / spans[0]
+    return () if share < _SHRUNK else (share,)
+
+
+class OutOfStroke(NamedTuple):
+    """Rows with actuators out of stroke; the limbs, with the least and the most of each."""
+
+    rows: tuple[int, ...]
+    limbs: dict[int, tuple[float, float]]
+
+
+def _out_of_stroke(found: Solution) -> tuple[OutOfStroke, ...]:
+    """Rows whose actuators are out of the strokes that the robot file states.
+
+    Both with the nominal machine, whose offsets may be unknown, and with the identified one,
+    which may have been misled.
+    """
+    start, end, equations = found.fit.start, found.fit.end, found.fit.equations
+    robot = start.robot
+    if not isinstance(robot, Robot):
+        return ()  # the file of an arm states no strokes
+    out = _beyond(robot, _drives(end))
+    if not out.any():
+        return ()
+    drive = _drives(start)
+    out &= _beyond(robot, drive)
+    limbs = {
+        i: (float(drive[out[:, i], i].min()), float(drive[out[:, i], i].max()))
+        for i in np.flatnonzero(out.any(axis=0)).tolist()
+    }
+    broken = np.asarray(out.any(axis=1))[np.concatenate(equations.pose_of)]
+    return at_most_one(
+        OutOfStroke(tuple(equations.rows[broken].tolist()), limbs) if limbs else None
+    )
+
+
+def _out_of_stroke_text(found: Solution, seen: OutOfStroke) -> str:
+    robot = instance("robot", found.fit.start.robot, Robot)
+    limbs = []
+    for i, (least, most) in seen.limbs.items():
+        low, high = robot.model.limbs[i].stroke or (0.0, 0.0)
+        limbs.append(
+            f"limb {i + 1} at {least:.4g} to {most:.4g}, its stroke is {low:g} to {high:g}"
+        )
+    more = f" and {len(limbs) - 2} more limbs" if len(limbs) > 2 else ""
+    return (
+        f"actuators out of stroke in {len(seen.rows)} of {len(found.fit.equations.rows)} rows"
+        f" (rows {first_rows(seen.rows, 10)}): {'; '.join(limbs[:2])}{more}; check units,"
+        " signs and columns of the actuators, or the strokes in the robot file"
+    )
+
+
+def _drives(evaluation: Evaluation) -> FloatArray:
+    """Drive coordinates (K, limbs) at the poses, each of its session's machine."""
+    return evaluation.machines.joined(
+        lambda robot, own: instance("robot", robot, Robot).feasible(evaluation.pose[own]).drive
+    )
+
+
+def _beyond(robot: Robot, drive: FloatArray) -> BoolArray:
+    """Which drives (K, limbs) are beyond their strokes by more than errors explain."""
+    strokes = [limb.stroke or (-np.inf, np.inf) for limb in robot.model.limbs]
+    drive = drive[:, : len(strokes)]  # without the tail
+    low, high = np.array(strokes).T
+    room = np.where(np.isfinite(low), _BEYOND * (high - low), 0.0)
+    out: BoolArray = (drive < low - room) | (drive > high + room)
+    return out
+
+
+CHECKS = (
+    Check(
+        name="implausible-changes",
+        about="numbers moved further than errors of manufacture explain",
+        unless=("unit-errors",),
+        at_once=True,
+        run=lambda found: at_most_one(far_numbers(found) or None),
+        say=lambda found, moved: (
+            f"{listed(list(moved))} moved by up to {max(moved.values()):.3g} mm, further than"
+            " errors of a machine: check that the robot file describes this one, or free fewer"
+            " parameters"
+        ),
+        remedies=lambda found, moved: (Remedy("fix", tuple(moved)),),
+    ),
+    Check(
+        name="other-modes",
+        about="rows fit another assembly mode than the one that the fit has for them",
+        at_once=True,
+        run=lambda found: in_other_modes(found.fit.equations, found.fit.end),
+        say=lambda found, text: text,
+    ),
+    Check(
+        name="distant-points",
+        about="points of the platform were found far away from it",
+        at_once=True,
+        run=_distant_points,
+        say=_distant_text,
+    ),
+    Check(
+        name="shrunk",
+        about="a machine of which only touches were read became smaller",
+        at_once=True,
+        run=_shrunk,
+        say=lambda found, share: (
+            f"the poses lie {100 * share:.2g} % closer together than before: touches alone do not"
+            " say how large a machine is, state touch_distances or measure a length as well"
+        ),
+    ),
+    Check(
+        name="beyond-strokes",
+        about="actuators are out of the strokes that the robot file states",
+        at_once=True,
+        run=_out_of_stroke,
+        say=_out_of_stroke_text,
+    ),
+)

@@ -1,0 +1,124 @@
+"""What the measurements determine, and how the search for it ended."""
+
+from __future__ import annotations
+
+from pkmcal.diagnostics.check import Check, Level, Remedy, at_most_one
+from pkmcal.diagnostics.linearity import Weak, beyond_linear
+from pkmcal.estimation.identifiability import listed
+from pkmcal.fitted.solution import Solution
+
+_LEAST_FREEDOM = 0.5  # degrees of freedom from which residuals show how good a fit is
+
+
+def _nothing_determined(found: Solution) -> bool:
+    return not found.fit.machine_combinations() and len(found.fit.parameters.places) > 0
+
+
+def _too_few(found: Solution) -> tuple[str, ...]:
+    """What there is too little of: poses, equations, or freedom; the sentence on it."""
+    equations = found.fit.uncertainty.equations
+    n, count = len(equations.parameters), int(equations.components.sum())
+    if len(equations.actuators) == 1 and len(equations.rows) > 1:
+        return ("all rows have the same actuators: measure different poses",)
+    if count < n and not len(found.fit.estimate.prior):
+        return (
+            f"{count} equations for {n} parameters: measure more poses, free fewer parameters or"
+            " state a prior",
+        )
+    if found.dof < _LEAST_FREEDOM:
+        return (
+            f"{count} equations for {found.rank} identifiable combinations: no degrees of freedom"
+            " are left to show how good the fit is; measure more poses",
+        )
+    return ()
+
+
+def _kept(found: Solution) -> int:
+    """How many combinations are so weak that the search kept what they had."""
+    state = found.fit.estimate.state
+    return state.determined.rank - state.fitted.rank
+
+
+def _kept_text(found: Solution, count: int) -> str:
+    worst = found.fit.estimate.state.worst
+    which = "combinations of parameters are" if count > 1 else "combination of parameters is"
+    size = worst == found.fit.start.robot.length
+    why = "the machine's size" if size else "and the search did not end with them"
+    return (
+        f"{count} {which} determined to no better than {worst:.3g} mm, {why}, and kept as before:"
+        " state a prior or measure more poses"
+    )
+
+
+def _weak(found: Solution) -> tuple[Weak, ...]:
+    return at_most_one(beyond_linear(found.fit.estimate, found.fit.uncertainty))
+
+
+def _level_of_weak(found: Solution, weak: Weak) -> Level:
+    return "remark" if weak.assembled else "doubt"
+
+
+CHECKS = (
+    Check(
+        name="nothing-determined",
+        about="the measurements determine no number of the machine",
+        levels=("grave",),
+        run=lambda found: at_most_one(_nothing_determined(found) or None),
+        say=lambda found, _: (
+            "these measurements determine no number of the machine, which is unchanged"
+        ),
+    ),
+    Check(
+        name="not-converged",
+        about="the least squares did not converge",
+        levels=("grave",),
+        at_once=True,
+        run=lambda found: () if found.converged else (found.evaluations,),
+        say=lambda found, _: "the least squares did not converge",
+    ),
+    Check(
+        name="at-bounds",
+        about="numbers ended at a bound",
+        run=lambda found: at_most_one(found.at_bounds or None),
+        say=lambda found, names: (
+            f"{listed(names)} ended at a bound: the fit would go further; widen the bound, or see"
+            " what else is wrong"
+        ),
+        remedies=lambda found, names: (Remedy("bounds"),),
+    ),
+    Check(
+        name="too-few-rows",
+        about="one pose only, or no more equations than numbers",
+        at_once=True,
+        run=_too_few,
+        say=lambda found, text: text,
+    ),
+    Check(
+        name="weak-combinations",
+        about="combinations of numbers are so weak that the search kept what they had",
+        at_once=True,
+        run=lambda found: at_most_one(_kept(found) or None),
+        say=_kept_text,
+        remedies=lambda found, _: (Remedy("prior"),),
+    ),
+    Check(
+        name="beyond-linear",
+        about="numbers are so uncertain that the machine is not linear over their ±",
+        unless=("grave",),
+        levels=("doubt", "remark"),
+        run=_weak,
+        level_of=_level_of_weak,
+        say=lambda found, weak: str(weak),
+        remedies=lambda found, weak: (Remedy("fix", weak.names), Remedy("prior")),
+    ),
+    Check(
+        name="uninformative-poses",
+        about="what was read at some poses determines these poses at most",
+        levels=("remark",),
+        run=lambda found: at_most_one(found.idle or None),
+        say=lambda found, count: (
+            f"{count} {'poses say' if count > 1 else 'pose says'} nothing: what was read there"
+            " determines the pose at most"
+        ),
+    ),
+)

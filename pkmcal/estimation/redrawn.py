@@ -1,0 +1,50 @@
+"""The equations of other readings of the same poses: replicates of the bootstrap."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from pkmcal.arrays import FloatArray
+from pkmcal.estimation.equations import Equations
+from pkmcal.estimation.evaluation import Evaluation
+
+
+def redrawn(
+    equations: Equations,
+    at: Evaluation,
+    noise: FloatArray,
+    reduced: FloatArray,
+    prior_centre: FloatArray,
+    drawn: FloatArray | None = None,
+) -> tuple[Equations, Evaluation]:
+    """The equations of other readings, and evaluated where these have been drawn.
+
+    Parameters
+    ----------
+    at : Evaluation
+        Where the machine is taken to be.
+    noise : ndarray (G,)
+        See `Whitening`.
+    reduced : ndarray (M,)
+        The residuals of the new readings there, as `residual`.
+    drawn : ndarray (s,), optional
+        That of `Parameters`.
+    prior_centre : ndarray (n,)
+        Another centre of the prior.
+    """
+    errors, closures = reduced, equations.closures
+    if equations.system is not None:
+        closures, errors = equations.system.redrawn(at, noise, reduced)
+    residuals = tuple(equations.whitening.unwhiten(errors, noise[: len(equations.sets)]))
+    sets = tuple(
+        replace(m, values=m.instrument.corrected(values, residual).reshape(m.values.shape))
+        for m, values, residual in zip(equations.sets, at.predicted, residuals, strict=True)
+    )
+    parameters = replace(equations.parameters, start=prior_centre, drawn=drawn)
+    prediction = replace(
+        equations.prediction, table=replace(equations.table, sets=sets), parameters=parameters
+    )
+    other = replace(equations, prediction=prediction, closures=closures)
+    if equations.closures.unknowns:
+        return other, other.at(at.theta, noise, at)
+    return other, replace(at, parameters=parameters, residuals=residuals, cache={})
