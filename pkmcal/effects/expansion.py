@@ -85,6 +85,81 @@ class Expansion:
         return MachineExpansion(of, coefficient, column, of.get("platform", 0.0))
 
 
+@dataclass(frozen=True, eq=False)
+class MachineExpansion:
+    """How the numbers of a machine grow with temperature.
+
+    Attributes
+    ----------
+    given : mapping of str to float
+        The coefficients as stated.
+    coefficient : ndarray (k,)
+        Of each number of its limbs, 1/K; 0 of angles.
+    column : ndarray of int (k,)
+        Which of the temperatures of a row it has.
+    platform : float
+        Of the platform, with the targets on it, 1/K.
+    """
+
+    given: Mapping[str, float]
+    coefficient: FloatArray
+    column: IntArray
+    platform: float
+    name: ClassVar[str] = "expansion"
+
+    def dependences(self, measured: Measurements) -> Iterator[Dependence]:
+        """None: its coefficients are exact."""
+        return iter(())
+
+    def of_rows(self, measured: Measurements) -> Growth:
+        """Relative growth of each number (N, k), and of places on the platform (N,).
+
+        Raises
+        ------
+        ValueError
+            No temperature, or none of a part that grows.
+        """
+        if measured.temperature is None:
+            raise ArgumentError(
+                "expansion: the measurements have no temperature; the file needs a column"
+                " temperature [°C]"
+            )
+        above = measured.temperature - REFERENCE
+        by_number = above[:, self.column]
+        by_number[:, self.coefficient == 0.0] = 0.0
+        platform = above[:, 1] if self.platform else np.zeros(len(above))
+        unread = np.isnan(by_number).any(axis=1) | np.isnan(platform)
+        if unread.any():
+            row = int(np.argmax(unread))
+            where = f"row {row}" if measured.lines is None else f"line {measured.lines[row]}"
+            file = f"{measured.file}, " if measured.file else ""
+            raise ArgumentError(f"expansion: {file}{where}: a temperature is missing")
+        return Growth(by_number * self.coefficient, platform * self.platform)
+
+
+@dataclass(frozen=True, eq=False)
+class Growth:
+    """Relative growth of each number (N, k), and of places on the platform (N,)."""
+
+    by_number: FloatArray
+    of_platform: FloatArray
+
+    def moved(
+        self,
+        machine: Any,
+        pose: FloatArray,
+        actuators: FloatArray,
+        rows: IntArray,
+        numbers: Mapping[str, FloatArray],
+    ) -> Moved:
+        """How the platform moves at poses (N, 6) of some rows."""
+        k = self.by_number.shape[1]
+        grown = machine.geometry.values[:k] * self.by_number[rows]
+        twists = machine.error_twists(pose, actuators)[..., :k]
+        twist = np.einsum("nij,nj->ni", twists, grown)
+        return Moved(twist, growth=self.of_platform[rows])
+
+
 def stated(effects: Sequence[object]) -> dict[str, float]:
     """The coefficients that were given, 1/K, by part; empty where the machine does not grow."""
     expansions = [each for each in effects if isinstance(each, MachineExpansion)]

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
-import pytest
 
 import pkmcal as pk
 from pkmcal.core import instruments
@@ -13,42 +10,10 @@ from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.free_parameters import parameters
 from pkmcal.estimation.parameters import Asked
-from pkmcal.estimation.starts import with_starts
-from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.readings import Between, Distance
 
 from .. import twin
-from ..simulated import hexapod_poses
-from .kinds import ARTEFACTS, KINDS, needed, predict, shape
-
-EVERY = (
-    *("pose", "position", "height", "distance", "between", "relative-distance", "orientation"),
-    *("tilt", *(f"touch {artefact}" for artefact in ARTEFACTS)),
-)
-
-
-def measured(robot: Robot, kind: str, rng: np.random.Generator) -> Measurements:
-    """Readings that the machine does not explain, of two targets in turn."""
-    kind, _, artefact = kind.partition(" ")
-    poses = hexapod_poses(robot, 12, rng)
-    q = robot.inverse(poses)
-    if kind == "pose":
-        return Measurements(q, poses + rng.normal(0, 0.01, poses.shape), kind)
-    if kind == "orientation":
-        return Measurements(q, poses[:, 3:] + rng.normal(0, 0.01, (12, 3)), kind)
-    if kind == "tilt":  # of a sensor on its side
-        seen = predict("tilt", poses, mounting=np.array([1.4, 0.1, -0.3])).values
-        return Measurements(q, seen + rng.normal(0, 0.01, (12, 2)), kind)
-    fields = needed(kind, 12, 6, artefact or "point")
-    two = np.array([[60.0, -20.0, 35.0], [300.0, 200.0, -50.0]])
-    fields |= {"target": two, "target_index": np.arange(12) % 2}
-    if "distance" in kind:
-        own = fields.get("instrument", Distance())
-        fields["instrument"] = replace(own, attachment=two[:, ::-1])
-    if kind == "between":
-        fields["instrument"] = Between(robot.inverse(hexapod_poses(robot, 12, rng)))
-    return Measurements(q, rng.normal(0, 3, shape(kind, 12, artefact or None)), kind, **fields)
+from .kinds import KINDS, predict
 
 
 def differences(equations: Equations, theta: np.ndarray, scale: np.ndarray) -> np.ndarray:
@@ -59,25 +24,6 @@ def differences(equations: Equations, theta: np.ndarray, scale: np.ndarray) -> n
         ahead, back = equations.at(theta + step), equations.at(theta - step)
         columns.append((back.residuals[0] - ahead.residuals[0]) / (2e-3 * s))
     return np.stack(columns, axis=-1)
-
-
-@pytest.mark.parametrize("unknown", [False, True], ids=["known", "unknown frame and target"])
-@pytest.mark.parametrize("kind", EVERY)
-def test_analytic_jacobian_equals_differences(kind: str, unknown: bool) -> None:
-    rng = np.random.default_rng(7)
-    robot = pk.load("hexapod")
-    readings = measured(robot, kind, rng)
-    (share,) = with_starts(robot, [FitData(readings, np.arange(12), unknown, unknown, unknown)])
-    chosen = parameters(robot, [share], Asked(["base*", "offset*", "gain*"]))
-    equations = Equations.of([share], chosen)
-    theta = chosen.start.copy()
-    if chosen.frame is not None:
-        theta[chosen.frame : chosen.frame + 6] = [400, -200, 90, 0.4, -0.7, 2.0]
-    (jacobian,) = equations.jacobian(equations.at(theta))
-    expected = differences(equations, theta, chosen.scale)
-    np.testing.assert_allclose(
-        jacobian * chosen.scale, expected * chosen.scale, rtol=0, atol=2e-7 * np.abs(expected).max()
-    )
 
 
 def test_jacobian_passes_through_ties() -> None:
