@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pkmcal.arguments import words
 from pkmcal.arrays import FloatArray, Int64Array
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.csv_table import Table
@@ -137,3 +138,53 @@ def one_or_each(name: str, units: Sequence[str], values: FloatArray) -> Iterator
         return
     for i, (unit, column) in enumerate(zip(units, values.T, strict=True)):
         yield WrittenColumn(f"{name}.q{i + 1}", unit, column)
+
+
+def values_array(
+    given: ArrayLike | None, instrument: Reading, rows: tuple[int, ...], alone: bool
+) -> FloatArray:
+    """What was read, (N, k) or (N,); NaN where nothing was, of orientations as a whole."""
+    kind, k = instrument.name, len(instrument.components)
+    if given is None:
+        if k:
+            raise ArgumentError(
+                f"values of kind {kind!r} must be given, found None: that goes with 'closure'"
+            )
+        return np.empty((rows[0], 0))
+    values = numbers("values", given, blank=True)
+    if alone:
+        if values.shape != ((k,) if k != 1 else ()):
+            what = f"have shape ({k},)" if k != 1 else "be a number"
+            raise ArgumentError(
+                f"values of kind {kind!r} must {what} for one row of actuators {rows[1:]}, or"
+                f" actuators have shape (N, n); found {values.shape}"
+            )
+        values = values[None]
+    expected = (rows[0], k) if k != 1 else rows[:1]
+    if values.shape != expected:
+        raise ArgumentError(
+            f"values of kind {kind!r} must have shape {expected} for {rows[0]} rows of"
+            f" actuators; found {values.shape}"
+        )
+    if (first := instrument.turning) is not None:
+        angles = np.isnan(values[:, first:])
+        part = angles.any(axis=1) & ~angles.all(axis=1)
+        if part.any():
+            raise ArgumentError(
+                "values: an orientation has three angles or none; found one left out in row"
+                f" {int(np.argmax(part))}"
+            )
+    return values
+
+
+def units_of_actuators(given: str | Sequence[str] | None, count: int) -> tuple[str, ...] | None:
+    """One unit per actuator, "mm" or "rad"; None where none is given."""
+    if given is None:
+        return None
+    units = words("actuator_units", given)
+    units = units * count if isinstance(given, str) else units
+    if len(units) != count or any(unit not in ("mm", "rad") for unit in units):
+        raise ArgumentError(
+            f'actuator_units must be "mm" or "rad" for {count} actuators; found {given!r}'
+        )
+    return units

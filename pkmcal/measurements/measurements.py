@@ -18,7 +18,7 @@ from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.drive_state import DriveState
 from pkmcal.measurements.actuator_sigma import ActuatorSigma
 from pkmcal.measurements.approach import Approach
-from pkmcal.measurements.field import declared, row_fields
+from pkmcal.measurements.field import declared, row_fields, units_of_actuators, values_array
 from pkmcal.measurements.former import OF_MEASUREMENTS, adapted
 from pkmcal.measurements.listing import table, title
 from pkmcal.measurements.measurement_writer import write_measurements
@@ -188,10 +188,10 @@ class Measurements(Result):
         own, read = instrument.of_rows(values, q, targets)
         self.__setstate__({
             "actuators": q,
-            "values": _values(read, own, q.shape, alone and read is values),
+            "values": values_array(read, own, q.shape, alone and read is values),
             "kind": own.name,
             "instrument": own,
-            "actuator_units": _units(actuator_units, q.shape[1]),
+            "actuator_units": units_of_actuators(actuator_units, q.shape[1]),
             "file": file,
             "notes": words("notes", notes),
         })  # fmt: skip
@@ -364,53 +364,3 @@ class Measurements(Result):
     def _parts(self) -> Iterator[str | Table]:
         yield title(self)
         yield table(self)
-
-
-def _values(
-    given: ArrayLike | None, instrument: Reading, rows: tuple[int, ...], alone: bool
-) -> FloatArray:
-    """What was read, (N, k) or (N,); NaN where nothing was, of orientations as a whole."""
-    kind, k = instrument.name, len(instrument.components)
-    if given is None:
-        if k:
-            raise ArgumentError(
-                f"values of kind {kind!r} must be given, found None: that goes with 'closure'"
-            )
-        return np.empty((rows[0], 0))
-    values = numbers("values", given, blank=True)
-    if alone:
-        if values.shape != ((k,) if k != 1 else ()):
-            what = f"have shape ({k},)" if k != 1 else "be a number"
-            raise ArgumentError(
-                f"values of kind {kind!r} must {what} for one row of actuators {rows[1:]}, or"
-                f" actuators have shape (N, n); found {values.shape}"
-            )
-        values = values[None]
-    expected = (rows[0], k) if k != 1 else rows[:1]
-    if values.shape != expected:
-        raise ArgumentError(
-            f"values of kind {kind!r} must have shape {expected} for {rows[0]} rows of"
-            f" actuators; found {values.shape}"
-        )
-    if (first := instrument.turning) is not None:
-        angles = np.isnan(values[:, first:])
-        part = angles.any(axis=1) & ~angles.all(axis=1)
-        if part.any():
-            raise ArgumentError(
-                "values: an orientation has three angles or none; found one left out in row"
-                f" {int(np.argmax(part))}"
-            )
-    return values
-
-
-def _units(given: str | Sequence[str] | None, count: int) -> tuple[str, ...] | None:
-    """One unit per actuator, "mm" or "rad"; None where none is given."""
-    if given is None:
-        return None
-    units = words("actuator_units", given)
-    units = units * count if isinstance(given, str) else units
-    if len(units) != count or any(unit not in ("mm", "rad") for unit in units):
-        raise ArgumentError(
-            f'actuator_units must be "mm" or "rad" for {count} actuators; found {given!r}'
-        )
-    return units

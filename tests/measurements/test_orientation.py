@@ -111,7 +111,7 @@ def test_derivatives_of_residuals_are_their_differences(name: str, framed: bool)
     theta = chosen.start.copy()
     if framed:
         theta[chosen.frame : chosen.frame + 6] = [40, -20, 9, 0.4, np.pi / 2, 2.0]
-    near = equations.guess.at_poses(np.arange(len(at)), at)
+    near = equations.at(theta).states.at_poses(np.arange(len(at)), at)
     (jacobian,) = equations.jacobian(equations.at(theta, near=near))
     for j, scale in enumerate(chosen.scale):
         step = np.eye(len(theta))[j] * 1e-4 * scale
