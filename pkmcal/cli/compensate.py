@@ -204,7 +204,8 @@ def _start(text: str | None) -> FloatArray | None:
     row = numbers_on_line("--start", text, POSE_UNITS, rad=False)
     if row is None:
         raise ArgumentError(f"--start must be six numbers, found {text!r}")
-    return row[0]
+    pose: FloatArray = row[0]
+    return pose
 
 
 def read_reached(path: str | PathLike[str]) -> FloatArray:

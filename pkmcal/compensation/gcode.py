@@ -11,7 +11,6 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-
 from pkmcal.arrays import FloatArray
 from pkmcal.compensation.gcode_dialect import AXES, NEVER_PASSED, Dialect, Meaning
 from pkmcal.compensation.gcode_line import Command, Unclear, Word, commands
@@ -135,7 +134,8 @@ class Program:
     stated : bool
         Whether that is known of the lengths; else a program has to begin with all of them.
     passed : collection of str
-        Words that move nothing and change no mode, as the user says.
+        Words that move nothing and change no mode, as the user says; of refused words, that they
+        do not what they are refused for.
     times : bool
         Whether moves are to state their times: G94 becomes G93.
 
@@ -219,8 +219,6 @@ class Program:
         moves = []
         for command in commands(code, self._dialect):
             meaning = self._meaning(command)
-            if meaning.refused:
-                raise Unclear(f"{command.shown} {meaning.value}")
             if meaning is Meaning.HOMES:
                 self._home(state)
             elif meaning is Meaning.MOVES:
@@ -241,13 +239,19 @@ class Program:
 
     def _meaning(self, command: Command) -> Meaning:
         """What a command does to the poses of this program."""
-        shown = command.shown.upper()
-        if {command.name, shown} & self._passed:
-            return Meaning.HARMLESS
         if not command.name:
             return Meaning.FOLLOWED
+        shown = command.shown.upper()
         meaning = self._dialect.meaning(command.name, command.letters)
         axes = command.letters & AXES
+        if {command.name, shown} & self._passed:  # what is refused may move the machine, too
+            return Meaning.MOVES if meaning is not None and meaning.refused else Meaning.HARMLESS
+        if meaning is not None and meaning.refused:
+            unless = "" if meaning in NEVER_PASSED else f"; if not here: --pass {shown}"
+            raise Unclear(f"{command.shown} {meaning.value}{unless}")
+        base = command.name.partition(".")[0]
+        if meaning is None and self._dialect.words.get(base) is Meaning.FOLLOWED:
+            raise Unclear(f"{shown} may be read as {base}")
         if meaning is None and axes:
             raise Unclear(
                 f"{shown} has axis letters and is none of {self._dialect.title}'s listed words;"
@@ -355,7 +359,7 @@ class Program:
             raise Unclear(
                 f"{where}: state the pose at the start, or let the first move name X, Y and Z"
             )
-        target = state.at.copy()
+        target: FloatArray = state.at.copy()
         for letter, word in axes.items():
             k = self._letters.index(letter)
             value = word.value * (state.scale if letter in "XYZ" else 1.0)

@@ -76,10 +76,16 @@ class Writer:
             raise self._program.wrong(
                 move.line, "a joint move needs the feed F of its G1, in mm a minute"
             )
+        if self._machine.joints and move.straight and not move.known:
+            raise self._program.wrong(
+                move.line,
+                "where this move begins is not known, nor how long it takes as a joint move: state"
+                " the pose at the start, or make it a rapid move, G0",
+            )
         if parts > 1 and move.behind:
             raise self._program.wrong(
                 move.line,
-                f"{move.behind} acts behind a move that is made in parts: give it a line of its own",
+                f"{move.behind} acts behind a move that is made in parts: give it another line",
             )
 
     def _words(self, move: Move, command: FloatArray, first: bool) -> dict[str, str]:
@@ -99,6 +105,8 @@ class Writer:
             else:
                 words[letter] = number(value, _DECIMALS)
             self._last[k] = value * scale
+        if not words:  # of a joint move that stays: no move is without
+            words[self._machine.written[0]] = number(float(command[0]), _DECIMALS)
         return words
 
     def _extruded(self, line: str, move: Move, done: float, part: float, count: int) -> str:

@@ -118,8 +118,9 @@ def compensate_program(
         The controller's pose when the program starts, and after homing, mm and rad. By default the
         first move has to name X, Y and Z; angles begin with those of home.
     passed : sequence of str
-        Macros and other words, such as ``"PARK"`` or ``"M420"``, that move nothing and change no
-        mode and no coordinate: they are refused or left otherwise.
+        Macros and other words, such as ``"PARK"``, that move nothing and change no mode; or
+        refused words, such as ``"M420"``, that here do not what they are refused for: the next move
+        behind each names all axes.
     out : str or path, optional
         Where to write the program, piece by piece, in place of `text`; it is there as a whole or
         not at all.
