@@ -169,8 +169,7 @@ class Program:
         for name in sorted(self._passed):
             if dialect.words.get(name) in NEVER_PASSED:
                 raise ArgumentError(
-                    f"passed: {name} moves the machine of {dialect.title} or sets a mode, and"
-                    " cannot be passed"
+                    f"passed: {name} is a word of {dialect.title} that cannot be passed"
                 )
 
     def wrong(self, line: int, message: str) -> FileError:
@@ -187,7 +186,7 @@ class Program:
         """
         state = _State(self._start, set())
         self._home(state)
-        marks = 0
+        marks, end, ending = 0, "", "\n"
         lines = io.TextIOWrapper(
             io.BytesIO(self._content), "utf-8", errors="surrogateescape", newline=""
         )
@@ -203,9 +202,11 @@ class Program:
                 except Unclear as error:
                     raise self.wrong(i, str(error)) from None
             yield line, move if marks < 2 else None
-        if state.timed and not line.endswith(("\n", "\r")):
-            yield "\n", None
-        yield from self._end_of_times(state, line)
+            end = line[len(line.rstrip("\r\n")) :]
+            ending = end or ending
+        if state.timed and not end:
+            yield ending, None
+        yield from self._end_of_times(state, ending)
 
     @staticmethod
     def _end_of_times(state: _State, line: str) -> Iterator[tuple[str, None]]:
@@ -352,10 +353,9 @@ class Program:
         if unknown:
             where = f"where {' and '.join(unknown)} is, is not known here"
             if state.lost_by:
-                raise Unclear(
-                    f"{where}, behind {state.lost_by}: name all axes, or, if it moves nothing and"
-                    f" changes no mode: --pass {state.lost_by}"
-                )
+                passed = f"; if it moves nothing and changes no mode: --pass {state.lost_by}"
+                unless = "" if state.lost_by in self._passed else passed
+                raise Unclear(f"{where}, behind {state.lost_by}: name all axes{unless}")
             raise Unclear(
                 f"{where}: state the pose at the start, or let the first move name X, Y and Z"
             )

@@ -24,7 +24,7 @@ class Meaning(Enum):
     BED = "adds a map of the bed, which holds errors that the program corrects"
     NUMBERS = "gives the controller other numbers than ROBOT has"
     MODES = "restores modes, which cannot be followed"
-    FLOW = "conditions, loops and calls cannot be followed"
+    FLOW = "is a condition, a loop or a call, which cannot be followed"
     PROGRAM = "runs another program, which is not corrected"
     MOTOR = "drives motors or parts of the machine, not poses"
     TIMES = "states the time of a move, which each of its parts would take"
@@ -36,7 +36,13 @@ class Meaning(Enum):
 
 
 _TAKEN = (Meaning.FOLLOWED, Meaning.HARMLESS, Meaning.HOMES, Meaning.MOVES)
-NEVER_PASSED = (Meaning.FOLLOWED, Meaning.CURVE, Meaning.TIMES)
+NEVER_PASSED = (
+    Meaning.FOLLOWED,
+    Meaning.CURVE,
+    Meaning.TIMES,
+    Meaning.FLOW,
+    Meaning.PROGRAM,
+)
 
 
 @dataclass(frozen=True)

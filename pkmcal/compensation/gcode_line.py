@@ -93,7 +93,7 @@ def _of_block(code: str, dialect: Dialect) -> list[Command]:
     codes: list[Command] = []
     motion, behind = Command("", "axis words"), ""
     words: dict[str, Word] = {}
-    for letter, word, text in _words(code, dialect):
+    for letter, word, text in _words(code, dialect, code):
         if letter not in ("G", "M", "T"):
             _add(words, letter, word)
             continue
@@ -175,15 +175,15 @@ def _command(code: str, dialect: Dialect) -> tuple[Command, int]:
     if _CHECKSUM.fullmatch(code):
         raise Unclear("the checksum would no longer be right: take checksums out")
     words: dict[str, Word] = {}
-    for each, word, _ in _words(" " * head.end() + rest, dialect):
+    for each, word, _ in _words(" " * head.end() + rest, dialect, code):
         _add(words, each, word)
     return Command(name, shown, frozenset(words), words), end
 
 
-def _words(code: str, dialect: Dialect) -> list[tuple[str, Word, str]]:
+def _words(code: str, dialect: Dialect, line: str) -> list[tuple[str, Word, str]]:
     """The words of plain G-code, each with its letter and the text of its number."""
     if not _PLAIN.fullmatch(code):
-        raise Unclear(f"{code.strip()!r:.40} is no plain G-code: words and numbers alone")
+        raise Unclear(f"{line.strip()!r:.40} is no plain G-code: words and numbers alone")
     if _EXPONENT.search(code):
         raise Unclear("E right behind a number may be an exponent: put a space before it")
     if dialect.capitals and code != code.upper():

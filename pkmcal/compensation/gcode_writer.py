@@ -140,13 +140,12 @@ class Writer:
         Of a joint move, the reciprocal of its minutes. Else none, unless the controller would take
         another time: it takes F along X, Y and Z, and along angles where none of these moves.
         """
-        if not move.straight:
+        joints = self._machine.joints
+        if not move.straight or (not joints and (self._lengths.all() or None in last)):
             return ""
         way = self._way(point - before)
-        if self._machine.joints:
+        if joints:
             return f"F{_figures(move.feed / way)}" if way else "F1000000"
-        if self._lengths.all() or None in last:
-            return ""
         step = np.array(self._last, dtype=float) - np.array(last, dtype=float)
         lengths = self._lengths
         longer = self._way(step) / way if way else 1.0
