@@ -1,4 +1,4 @@
-"""Programs by chance, for each firmware: of its usual words, and of words that mean something else."""
+"""Programs by chance, for each firmware: usual words, and words that mean something else."""
 
 from __future__ import annotations
 
@@ -6,44 +6,87 @@ import random
 
 LINE_ENDS = ("\n", "\r\n", "\r")
 HARMLESS = {
-    "linuxcnc": "G4 P0.1|M3 S200|M5|M8|G64 P0.01|G17 G40 G49|(note X5)|; G1 X9|G91.1|S300|T2|M64 P1",
-    "marlin": "G4 P20|M106 S255|M107|M117 Hello (X5) G1 X9|M204 P500 T500|M73 P5|; G1 X9|M104 S200 T0"
-    "|M207 S1 F2700|G11|M400|(note)|M203 X500 Y500|M900 K0.05|%",
-    "reprap": "G4 P20|M106 S255|M117 Hello X5|M204 P500 T500|; G1 X9|M104 S200|M207 S1 F2700|G10 P0 S195"
-    '|M291 P"G1 X9" S2|M400|M120|M566 X500 Y500|(note)|echo "X5"|G11',
-    "klipper": "G4 P20|M106 S255|M117 Hello (X5)|M204 S500|; G1 X9|M104 S200|G10|M400|SET_PIN PIN=a VALUE=1"
-    '|EXCLUDE_OBJECT_START NAME=x_1|SET_VELOCITY_LIMIT ACCEL=500|BED_MESH_CLEAR|RESPOND MSG="X5"|G17|M73',
+    "linuxcnc": """
+        G4 P0.1 | M3 S200 | M5 | M8 | G64 P0.01 | G17 G40 G49 | (note X5) | ; G1 X9 | G91.1 |
+        S300 | T2 | M64 P1
+    """,
+    "marlin": """
+        G4 P20 | M106 S255 | M107 | M117 Hello (X5) G1 X9 | M204 P500 T500 | M73 P5 | ; G1 X9 |
+        M104 S200 T0 | M207 S1 F2700 | G11 | M400 | (note) | M203 X500 Y500 | M900 K0.05 | %
+    """,
+    "reprap": """
+        G4 P20 | M106 S255 | M117 Hello X5 | M204 P500 T500 | ; G1 X9 | M104 S200 |
+        M207 S1 F2700 | G10 P0 S195 | M291 P"G1 X9" S2 | M400 | M120 | M566 X500 Y500 | (note) |
+        echo "X5" | G11
+    """,
+    "klipper": """
+        G4 P20 | M106 S255 | M117 Hello (X5) | M204 S500 | ; G1 X9 | M104 S200 | G10 | M400 |
+        SET_PIN PIN=a VALUE=1 | EXCLUDE_OBJECT_START NAME=x_1 | SET_VELOCITY_LIMIT ACCEL=500 |
+        BED_MESH_CLEAR | RESPOND MSG="X5" | G17 | M73
+    """,
 }
 ELSEWHERE = {
-    "linuxcnc": "G28|G30|T1 M6|M101|M150 P3",
-    "marlin": "G30|T1|M600|M84|G27|G61|PARK_HEAD|M401|G12",
-    "reprap": 'G30|T1|M98 P"a.g"|M84|M401|M600|M1',
-    "klipper": "PARK_HEAD|T1|START_PRINT BED=60|M84|M600|NOZZLE_WIPE",
+    "linuxcnc": """
+        G28 | G30 | T1 M6 | M101 | M150 P3
+    """,
+    "marlin": """
+        G30 | T1 | M600 | M84 | G27 | G61 | PARK_HEAD | M401 | G12
+    """,
+    "reprap": """
+        G30 | T1 | M98 P"a.g" | M84 | M401 | M600 | M1
+    """,
+    "klipper": """
+        PARK_HEAD | T1 | START_PRINT BED=60 | M84 | M600 | NOZZLE_WIPE
+    """,
 }
 ODD = {
-    "linuxcnc": "G2 X1 Y1 I1 J0|G81 X1 Y1 Z1 R2|G92 X0|G92.3|G55|G10 L2 P1 X1|G10 L20 P1 X0|G53 G0 X1|G43 H1"
-    "|G52 X5|G93|G93 G1 X3 F2|M72|M98 P1|G28 X0 Y0|X1 G30|G4 P0.5 G1 X20 F100|M64 P1 X10|G1 X#1|/G1 X1|G1 X[1]"
-    "|o100 sub|G1 X1e-05|G1 X5 G91|G91 X3|G90|G20|G21|G95|G94|G1 Y3 M1|G80|X4|G38.2 X1|G1 X5 X6|G0 G1 X2|%"
-    "|G1 (a (b) X5|M30|G64|(G1 X5|G1 X5 ; (a|N5 X3|n9g1x4y5|g 1 x 4|G1.0 X3|T3 M6 X5|G28 Z5|M429|G5 X1 Y1 P1 Q1"
-    "|G41 D1|M6 G1 X5 F90|F250|G1 F333|G1 X5 H3|G1 X5 P2|G7|G33 Z-1 K1",
-    "marlin": "G2 X1 Y1 I1|G92 X0|G92|M206 X1|M218 T1 X5|M290 Z0.1|M665 L360|M92 X80|M501|M502|M420 S1|M808 L5"
-    "|M808|M23 a.g|M24|M32 a.g|G29|G33|G53|G55|G91.1|G90.1|g1 x9|G1 X5 Y5 Z5 e3|G1 X5 G91|G90 G20|G20|G21"
-    "|M82|M83|G90|G91|X9|G1 X1e-05|G1X5Y6|G01 X7|G 1 X7|N7 G1 X6|N8G1 X6|G1 X6*77|G1 X5 (Z3)|(G1 X5)|G1 X5 X6"
-    "|G4 P5 G1 X20|M999 X5|FOO X5|M605 S2|M851 Z1|M852 I1|M360|M810 G1 X5|G28 X|G28 X0 Y0|G92 E0|G92 E5|G42 I1 J1"
-    "|M207 S1 F100|F500|G1 F700|G1 X5 H2|G1 X4 S200|M211 S0|M350 X16|G92 E0 X5|G54|G60|G5 X1 Y2|T0 X5|%",
-    "reprap": 'G2 X1 Y1 I1|G92 X0|G92|M206 X1|M290 S0.1|M665 R100|M92 X80|M501|M502|M375|M376 H5|M584 X0|M32 "a"'
-    "|M23 a|M24|G29|G29 S1|G32|G53|G55|G68 R5|G1 H2 X5|G1 H1 Z-9|G1 R2 X0 Y0 Z5|G1 S2 X5|G1 P1 X5|G91.1|M121"
-    "|if x|while true|M579 X1.01|M556 S100 X1|G1 X1e-05|G1 X5E3|G1 X1E-5|G28 G1 X20|G28 G1 X2 Y3 Z40|G1 X5 G91"
-    "|G90 G21|M106 S9 G1 X7|G1 X3 M107|G1 X5 G1 X6|G4 P5 G1 X20|M64 P1 X10|G20|G21|M82|M83|G90|G91|X9|G1 X{1+2}"
-    '|G1 X5 (Z3)|(a) G1 X5|g1 x5|G1 \'x5|N3 G1 X5|G92 E0|G92 E4|G10 L2 P1 X5|G10 P1 X5|G10 L20 P1 Z0|G31 Z2|M98 P"X5"'
-    "|M999 X5|G28 X|G28 X0 Y0|G1 F900|F900|G60|G61|M669 K1|G01 X4|G1.1 X4|M569 P0 S1|G93|M42 X5|M600 X5|G30 P0 X1 Y1",
-    "klipper": "G2 X1 Y1 I1|G92 X0|G92|SET_GCODE_OFFSET Z=0.1|SET_KINEMATIC_POSITION X=10|SET_SKEW XY=1,2,3"
-    "|SKEW_PROFILE LOAD=a|BED_MESH_PROFILE LOAD=a|RESTORE_GCODE_STATE NAME=a|FORCE_MOVE STEPPER=x DISTANCE=1"
-    "|MANUAL_STEPPER STEPPER=a MOVE=1|SET_DUAL_CARRIAGE CARRIAGE=1|G01 X5|g1 x5|G1 X5 G91|G90 G21|G20|G21|M82|M83"
-    "|G90|G91|X9|G1 X1e-05|G1X5Y6E1|G1 X5 (Z3)|(G1 X5)|( G28 X )|G4 P5 G1 X20|PARK X=5|park x=5|M999 X5|G28 X0"
-    "|G92 E0|G92 E4|SDCARD_PRINT_FILE FILENAME=a|M23 a|M24|G1 X5 X6|N3 G1 X5|N3G1 X5|G91.1|G1 F900|F900|G1 X5 R2"
-    "|DELTA_CALIBRATE|save_gcode_state|M600 X5|G92.1|G1 X5*3|set_skew xy=1|SAVE_GCODE_STATE NAME=X|T0 X5|G1.0 X5",
+    "linuxcnc": """
+        G2 X1 Y1 I1 J0 | G81 X1 Y1 Z1 R2 | G92 X0 | G92.3 | G55 | G10 L2 P1 X1 | G10 L20 P1 X0 |
+        G53 G0 X1 | G43 H1 | G52 X5 | G93 | G93 G1 X3 F2 | M72 | M98 P1 | G28 X0 Y0 | X1 G30 |
+        G4 P0.5 G1 X20 F100 | M64 P1 X10 | G1 X#1 | /G1 X1 | G1 X[1] | o100 sub | G1 X1e-05 |
+        G1 X5 G91 | G91 X3 | G90 | G20 | G21 | G95 | G94 | G1 Y3 M1 | G80 | X4 | G38.2 X1 |
+        G1 X5 X6 | G0 G1 X2 | % | G1 (a (b) X5 | M30 | G64 | (G1 X5 | G1 X5 ; (a | N5 X3 |
+        n9g1x4y5 | g 1 x 4 | G1.0 X3 | T3 M6 X5 | G28 Z5 | M429 | G5 X1 Y1 P1 Q1 | G41 D1 |
+        M6 G1 X5 F90 | F250 | G1 F333 | G1 X5 H3 | G1 X5 P2 | G7 | G33 Z-1 K1
+    """,
+    "marlin": """
+        G2 X1 Y1 I1 | G92 X0 | G92 | M206 X1 | M218 T1 X5 | M290 Z0.1 | M665 L360 | M92 X80 |
+        M501 | M502 | M420 S1 | M808 L5 | M808 | M23 a.g | M24 | M32 a.g | G29 | G33 | G53 | G55 |
+        G91.1 | G90.1 | g1 x9 | G1 X5 Y5 Z5 e3 | G1 X5 G91 | G90 G20 | G20 | G21 | M82 | M83 |
+        G90 | G91 | X9 | G1 X1e-05 | G1X5Y6 | G01 X7 | G 1 X7 | N7 G1 X6 | N8G1 X6 | G1 X6*77 |
+        G1 X5 (Z3) | (G1 X5) | G1 X5 X6 | G4 P5 G1 X20 | M999 X5 | FOO X5 | M605 S2 | M851 Z1 |
+        M852 I1 | M360 | M810 G1 X5 | G28 X | G28 X0 Y0 | G92 E0 | G92 E5 | G42 I1 J1 |
+        M207 S1 F100 | F500 | G1 F700 | G1 X5 H2 | G1 X4 S200 | M211 S0 | M350 X16 | G92 E0 X5 |
+        G54 | G60 | G5 X1 Y2 | T0 X5 | %
+    """,
+    "reprap": """
+        G2 X1 Y1 I1 | G92 X0 | G92 | M206 X1 | M290 S0.1 | M665 R100 | M92 X80 | M501 | M502 |
+        M375 | M376 H5 | M584 X0 | M32 "a" | M23 a | M24 | G29 | G29 S1 | G32 | G53 | G55 |
+        G68 R5 | G1 H2 X5 | G1 H1 Z-9 | G1 R2 X0 Y0 Z5 | G1 S2 X5 | G1 P1 X5 | G91.1 | M121 |
+        if x | while true | M579 X1.01 | M556 S100 X1 | G1 X1e-05 | G1 X5E3 | G1 X1E-5 |
+        G28 G1 X20 | G28 G1 X2 Y3 Z40 | G1 X5 G91 | G90 G21 | M106 S9 G1 X7 | G1 X3 M107 |
+        G1 X5 G1 X6 | G4 P5 G1 X20 | M64 P1 X10 | G20 | G21 | M82 | M83 | G90 | G91 | X9 |
+        G1 X{1+2} | G1 X5 (Z3) | (a) G1 X5 | g1 x5 | G1 'x5 | N3 G1 X5 | G92 E0 | G92 E4 |
+        G10 L2 P1 X5 | G10 P1 X5 | G10 L20 P1 Z0 | G31 Z2 | M98 P"X5" | M999 X5 | G28 X |
+        G28 X0 Y0 | G1 F900 | F900 | G60 | G61 | M669 K1 | G01 X4 | G1.1 X4 | M569 P0 S1 | G93 |
+        M42 X5 | M600 X5 | G30 P0 X1 Y1
+    """,
+    "klipper": """
+        G2 X1 Y1 I1 | G92 X0 | G92 | SET_GCODE_OFFSET Z=0.1 | SET_KINEMATIC_POSITION X=10 |
+        SET_SKEW XY=1,2,3 | SKEW_PROFILE LOAD=a | BED_MESH_PROFILE LOAD=a |
+        RESTORE_GCODE_STATE NAME=a | FORCE_MOVE STEPPER=x DISTANCE=1 |
+        MANUAL_STEPPER STEPPER=a MOVE=1 | SET_DUAL_CARRIAGE CARRIAGE=1 | G01 X5 | g1 x5 |
+        G1 X5 G91 | G90 G21 | G20 | G21 | M82 | M83 | G90 | G91 | X9 | G1 X1e-05 | G1X5Y6E1 |
+        G1 X5 (Z3) | (G1 X5) | ( G28 X ) | G4 P5 G1 X20 | PARK X=5 | park x=5 | M999 X5 | G28 X0 |
+        G92 E0 | G92 E4 | SDCARD_PRINT_FILE FILENAME=a | M23 a | M24 | G1 X5 X6 | N3 G1 X5 |
+        N3G1 X5 | G91.1 | G1 F900 | F900 | G1 X5 R2 | DELTA_CALIBRATE | save_gcode_state |
+        M600 X5 | G92.1 | G1 X5*3 | set_skew xy=1 | SAVE_GCODE_STATE NAME=X | T0 X5 | G1.0 X5
+    """,
 }
+
+
+def _one(words: str, rng: random.Random) -> str:
+    return rng.choice([each.strip() for each in words.split("|")])
 
 
 def program(firmware: str, rng: random.Random, odd: int = 0, joints: bool = False) -> str:
@@ -62,13 +105,13 @@ def program(firmware: str, rng: random.Random, odd: int = 0, joints: bool = Fals
                 _move(firmware, rng, unit, relative, rng.choice(["X", "XY", "XYZ", "Z", "Y", ""]))
             )
         elif kind < 0.75:
-            lines.append(rng.choice(HARMLESS[firmware].split("|")))
+            lines.append(_one(HARMLESS[firmware], rng))
         elif kind < 0.85 and not joints:
             relative = not relative
             lines += _mode(firmware, rng, relative)
         elif kind < 0.93:
             home = firmware != "linuxcnc" and rng.random() < 0.3
-            lines.append("G28" if home else rng.choice(ELSEWHERE[firmware].split("|")))
+            lines.append("G28" if home else _one(ELSEWHERE[firmware], rng))
             if relative:
                 relative = False
                 lines += _mode(firmware, rng, False)
@@ -76,7 +119,7 @@ def program(firmware: str, rng: random.Random, odd: int = 0, joints: bool = Fals
                 lines.append("G92 E0")
             lines.append(_move(firmware, rng, unit, relative, "XYZ", rapid=joints))
     for _ in range(odd):
-        lines.insert(rng.randrange(len(lines) + 1), rng.choice(ODD[firmware].split("|")))
+        lines.insert(rng.randrange(len(lines) + 1), _one(ODD[firmware], rng))
     if firmware == "linuxcnc":
         lines += rng.choice([[], ["M2"], ["M30"], ["G0 Z45 M30"]])
         if rng.random() < 0.4:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from .controller import Controller, Odd
 
-# by their pages: other geometry, offsets, levelling, other programs, loops, curves, axes of machines
+# by their pages: other geometry, offsets, levelling, other programs, loops, curves
 ODD = {
     *("M92", "M206", "M218", "M290", "M350", "M360", "M364", "M420", "M421", "M422", "M423"),
     *("M425", "M428", "M501", "M502", "M605", "M665", "M666", "M808", "M851", "M852"),

@@ -40,7 +40,7 @@ KNOWN = {
 
 
 def run(text: str, start: dict[str, float], home: dict[str, float], version: int) -> Controller:
-    """Run a program: version 1 counts relative extrusion in absolute numbers, and is in CNC mode."""
+    """Run it; version 1 counts relative extrusion in absolute numbers, and is in CNC mode."""
     it = Controller(dict(start))
     state = {"relative": False, "e_relative": False, "inch": False, "last": ""}
     for line in text.replace("\r\n", "\n").replace("\r", "\n").split("\n"):
