@@ -141,6 +141,8 @@ class Program:
 
     Attributes
     ----------
+    dialect : Dialect
+        The firmware.
     left : dict
         Words that may move the machine, by the line where each is first.
 
@@ -162,7 +164,8 @@ class Program:
         times: bool = False,
     ) -> None:
         self.left: dict[str, int] = {}
-        self._content, self._place, self._dialect = content, place, dialect
+        self.dialect = dialect
+        self._content, self._place = content, place
         self._letters, self._start, self._stated = letters, start, stated
         self._passed = frozenset(name.upper() for name in passed)
         self._times = times
@@ -186,6 +189,7 @@ class Program:
         """
         state = _State(self._start, set())
         self._home(state)
+        marked: bool | None = None  # whether the program begins with %
         marks, end, ending = 0, "", "\n"
         lines = io.TextIOWrapper(
             io.BytesIO(self._content), "utf-8", errors="surrogateescape", newline=""
@@ -193,8 +197,9 @@ class Program:
         for i, line in enumerate(lines):
             code = line.rstrip("\r\n")
             code = code.replace(MARK, " ", 1) if i == 0 else code
-            if code.strip() == "%" and self._dialect.block:
-                marks += 1
+            marked = code.strip() == "%" if marked is None and code.strip() else marked
+            if code.strip() == "%" and self.dialect.block:
+                marks += bool(marked)
                 yield from self._end_of_times(state, line)
             if marks < 2:  # what stands behind the second is not executed
                 try:
@@ -218,7 +223,7 @@ class Program:
     def _line(self, i: int, line: str, code: str, state: _State) -> tuple[str, Move | None]:
         """A line as it is to be written, and its move."""
         moves = []
-        for command in commands(code, self._dialect):
+        for command in commands(code, self.dialect):
             meaning = self._meaning(command)
             if meaning is Meaning.HOMES:
                 self._home(state)
@@ -243,7 +248,7 @@ class Program:
         if not command.name:
             return Meaning.FOLLOWED
         shown = command.shown.upper()
-        meaning = self._dialect.meaning(command.name, command.letters)
+        meaning = self.dialect.meaning(command.name, command.letters)
         axes = command.letters & AXES
         if {command.name, shown} & self._passed:  # what is refused may move the machine, too
             return Meaning.MOVES if meaning is not None and meaning.refused else Meaning.HARMLESS
@@ -251,14 +256,14 @@ class Program:
             unless = "" if meaning in NEVER_PASSED else f"; if not here: --pass {shown}"
             raise Unclear(f"{command.shown} {meaning.value}{unless}")
         base = command.name.partition(".")[0]
-        if meaning is None and self._dialect.words.get(base) is Meaning.FOLLOWED:
+        if meaning is None and self.dialect.words.get(base) is Meaning.FOLLOWED:
             raise Unclear(f"{shown} may be read as {base}")
         if meaning is None and axes:
             raise Unclear(
-                f"{shown} has axis letters and is none of {self._dialect.title}'s listed words;"
+                f"{shown} has axis letters and is none of {self.dialect.title}'s listed words;"
                 f" if it moves nothing and changes no mode: --pass {shown}"
             )
-        if meaning is Meaning.MOVES and axes and self._dialect.block:
+        if meaning is Meaning.MOVES and axes and self.dialect.block:
             raise Unclear(f"{shown} with axis words goes by a point that is not corrected")
         return meaning or Meaning.MOVES
 
@@ -294,9 +299,9 @@ class Program:
         """The move of a G0 or G1, or of words alone; none if no axis moves."""
         words = command.words or {}
         axes = {letter: word for letter, word in words.items() if letter in AXES}
-        unknown = words.keys() - AXES - self._dialect.letters
-        if not command.name and (axes or not self._dialect.block):
-            if state.straight is None or not self._dialect.block:
+        unknown = words.keys() - AXES - self.dialect.letters
+        if not command.name and (axes or not self.dialect.block):
+            if state.straight is None or not self.dialect.block:
                 raise Unclear("axis words without G0 or G1 before them")
         elif command.name:
             state.straight = command.name == "G1"
@@ -370,11 +375,11 @@ class Program:
         """The E word of a move, as far as all versions of the firmware agree about it."""
         if word is None:
             return None
-        relative = self._dialect.e_is_relative(state.own, state.relative, state.last)
+        relative = self.dialect.e_is_relative(state.own, state.relative, state.last)
         before = state.extruded
         if relative is False:
             state.extruded = word.value
-        elif relative and before is not None and self._dialect.adds_relative:
+        elif relative and before is not None and self.dialect.adds_relative:
             state.extruded = before + word.value
         else:
             state.extruded = None

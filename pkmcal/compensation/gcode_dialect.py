@@ -56,11 +56,11 @@ class Dialect:
     words : dict
         What its words mean, by name: ``"G1"``, ``"M104"``, ``"T"``, ``"SET_PIN"``.
     texts : frozenset of str
-        Words behind which the rest of the line is a text.
+        Words behind which the rest of the line is a text; of several commands, if not in quotes.
     letters : frozenset of str
         Words that G0 and G1 may have beside axes.
     remark : str
-        The pattern of a comment.
+        The pattern of a comment, and of texts in which none begins.
     several : bool
         Whether a line may have several commands, one after the other; else the first alone counts.
     block : bool

@@ -10,20 +10,27 @@ from typing import NamedTuple
 from pkmcal.compensation.gcode_dialect import AXES, Dialect, Meaning
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"
-_WORD = re.compile(rf"([A-Za-z])[ \t]*({_NUMBER})")
-_PLAIN = re.compile(rf"\s*(?:[A-Za-z][ \t]*{_NUMBER}\s*)*")
-_HEAD = re.compile(
+
+
+def _ascii(pattern: str) -> re.Pattern[str]:
+    """A pattern to which digits and spaces of other scripts are none, as to controllers."""
+    return re.compile(pattern, re.ASCII)
+
+
+_WORD = _ascii(rf"([A-Za-z])[ \t]*({_NUMBER})")
+_PLAIN = _ascii(rf"\s*(?:[A-Za-z][ \t]*{_NUMBER}\s*)*")
+_HEAD = _ascii(
     r"\s*(?:[Nn][ \t]*\d+(?:[ \t]+|$))?"
     r"(?:([A-Za-z_][A-Za-z_]\w*)|([GMTgmt])[ \t]*(\d+(?:\.\d+)?)?)?"
 )
-_EXPONENT = re.compile(r"[\d.][Ee][-+]?[\d.]")
-_CHECKSUM = re.compile(r".*\*\s*\d+\s*")
-_TEXT = re.compile(r'"[^"]*"|\{[^{}]*\}')
-_NEXT = re.compile(r"[GgMm]")
-_PASSED_OVER = re.compile(r"(?<![A-Za-z_=])[GgMm](?=[ \t]*\d)")
-_LETTER = re.compile(r"(?<![A-Za-z_=])[A-Za-z](?![A-Za-z_])")
-_PROGRAM_NUMBER = re.compile(r"\s*[Oo]\s*\d+\s*")
-_REMARK_ALONE = re.compile(r"\s*\([^()]*\)\s*")
+_EXPONENT = _ascii(r"[\d.][Ee][-+]?[\d.]")
+_CHECKSUM = _ascii(r".*\*\s*\d+\s*")
+_TEXT = _ascii(r'"[^"]*"?|\{[^{}]*\}')
+_NEXT = _ascii(r"[GgMm]")
+_PASSED_OVER = _ascii(r"(?<![A-Za-z_=])[GgMm](?=[ \t]*\d)")
+_LETTER = _ascii(r"(?<![A-Za-z_=])[A-Za-z](?![A-Za-z_])")
+_PROGRAM_NUMBER = _ascii(r"\s*[Oo]\s*\d+\s*")
+_REMARK_ALONE = _ascii(r"\s*\([^()]*\)\s*")
 
 
 class Word(NamedTuple):
@@ -75,7 +82,7 @@ def commands(line: str, dialect: Dialect) -> list[Command]:
     Unclear
         A line that versions of the firmware read differently, or not at all.
     """
-    code = _compiled(dialect.remark).sub(lambda found: " " * len(found[0]), line)
+    code = _compiled(dialect.remark).sub(_blank, line)
     if not code.strip() or code.strip() == "%":
         return []
     return _of_block(code, dialect) if dialect.block else _in_turn(code, dialect)
@@ -84,6 +91,11 @@ def commands(line: str, dialect: Dialect) -> list[Command]:
 @lru_cache
 def _compiled(pattern: str) -> re.Pattern[str]:
     return re.compile(pattern)
+
+
+def _blank(found: re.Match[str]) -> str:
+    """Spaces for a remark; a text in quotation marks stays, whatever is in it."""
+    return found[0] if found[0][0] == '"' else " " * len(found[0])
 
 
 def _of_block(code: str, dialect: Dialect) -> list[Command]:
@@ -163,7 +175,8 @@ def _command(code: str, dialect: Dialect) -> tuple[Command, int]:
         name, shown = dialect.name(letter, number or ""), letter + (number or "")
     if dialect.capitals and letter and letter.islower():
         raise Unclear(f"{shown} is not in capitals: {dialect.title} may not read it")
-    if name in dialect.texts:
+    quoted = dialect.several and code[head.end() :].lstrip().startswith('"')
+    if name in dialect.texts and not quoted:
         return Command(name, shown), len(code)
     rest = _TEXT.sub(lambda found: "_" * len(found[0]), code[head.end() :])
     following = None if macro else (_NEXT if dialect.several else _PASSED_OVER).search(rest)

@@ -62,7 +62,8 @@ class Writer:
             named = [letter + value for letter, value in words.items()]
             text += " ".join([head, *named, *filter(None, [extra, feed])]) + end
         if fed and not self._machine.joints:
-            text += f"G1 F{_figures(move.feed / move.scale)}" + end
+            head = "" if self._program.dialect.block else "G1 "
+            text += f"{head}F{_figures(move.feed / move.scale)}" + end
         return text if line.endswith(("\n", "\r")) else text[: -len(end)]
 
     def _require(self, move: Move, parts: int) -> None:
@@ -72,7 +73,7 @@ class Writer:
             raise self._program.wrong(
                 move.line, "joint moves are made of absolute coordinates in mm"
             )
-        if self._machine.joints and move.straight and (move.per_turn or not move.feed):
+        if self._machine.joints and move.straight and (move.per_turn or move.feed <= 0.0):
             raise self._program.wrong(
                 move.line, "a joint move needs the feed F of its G1, in mm a minute"
             )
@@ -153,7 +154,7 @@ class Writer:
             longer *= 1.0 / move.scale if np.any(step[lengths]) else move.scale
         if longer == 0.0 or abs(longer - 1.0) <= _SLOWER:
             return ""
-        if not move.feed:
+        if move.feed <= 0.0:
             raise self._program.wrong(move.line, "needs a feed F: corrected, its length changes")
         return f"F{_figures(move.feed / move.scale * longer)}"
 

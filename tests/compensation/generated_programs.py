@@ -41,6 +41,9 @@ ELSEWHERE = {
 }
 ODD = {
     "linuxcnc": """
+        G53 G0 Z50 | % | % |
+        G1 X\u0663 | G1\u00a0X5 | G1 X5 ; (a) G1 Y5 | (a;b) X5 | G0 F-3 | T1 G1 X5 |
+        G1 X6 G4 P1 | M62 P0 X3 | F0 | G90.1 G1 X3 | G1 X3 G91.1 | O77 | O77 G1 X5 | n4 | G61.1 X5 |
         G2 X1 Y1 I1 J0 | G81 X1 Y1 Z1 R2 | G92 X0 | G92.3 | G55 | G10 L2 P1 X1 | G10 L20 P1 X0 |
         G53 G0 X1 | G43 H1 | G52 X5 | G93 | G93 G1 X3 F2 | M72 | M98 P1 | G28 X0 Y0 | X1 G30 |
         G4 P0.5 G1 X20 F100 | M64 P1 X10 | G1 X#1 | /G1 X1 | G1 X[1] | o100 sub | G1 X1e-05 |
@@ -50,6 +53,9 @@ ODD = {
         M6 G1 X5 F90 | F250 | G1 F333 | G1 X5 H3 | G1 X5 P2 | G7 | G33 Z-1 K1
     """,
     "marlin": """
+        G1 X\u0663 |
+        G1\u00a0X5 | M117 "a" G1 X5 | M118 ;G1 X5 | @pause | G1 X5 E | G1 X | M104 S1 G1 X5 |
+        G10 L2 X1 | M82 G1 X5 | G91 X5 | T1 G1 X5 | N4 | G1 X5 // a | M203 X5 G1 X6 | m82 | g91 |
         G2 X1 Y1 I1 | G92 X0 | G92 | M206 X1 | M218 T1 X5 | M290 Z0.1 | M665 L360 | M92 X80 |
         M501 | M502 | M420 S1 | M808 L5 | M808 | M23 a.g | M24 | M32 a.g | G29 | G33 | G53 | G55 |
         G91.1 | G90.1 | g1 x9 | G1 X5 Y5 Z5 e3 | G1 X5 G91 | G90 G20 | G20 | G21 | M82 | M83 |
@@ -60,6 +66,9 @@ ODD = {
         G54 | G60 | G5 X1 Y2 | T0 X5 | %
     """,
     "reprap": """
+        M98 P"a;b" G1 X5 | M30 "a" G1 X6 | M117 "x" G1 X7 | M118 S"a" G1 X4 | M117 a" ; G1 X8 |
+        M291 P"a" S1 G1 X3 | G1 X5 T1 | T1 G1 X5 | M582 T1 | M118 G1 X9 | M36 "b" G1 X2 ; "G1 |
+        G1 X\u0663 | G1\u00a0X5 | M117 x ; "y" G1 X5 | G1 X5 ; "a" G1 Y5 | M106 S1 M107 G1 X3 |
         G2 X1 Y1 I1 | G92 X0 | G92 | M206 X1 | M290 S0.1 | M665 R100 | M92 X80 | M501 | M502 |
         M375 | M376 H5 | M584 X0 | M32 "a" | M23 a | M24 | G29 | G29 S1 | G32 | G53 | G55 |
         G68 R5 | G1 H2 X5 | G1 H1 Z-9 | G1 R2 X0 Y0 Z5 | G1 S2 X5 | G1 P1 X5 | G91.1 | M121 |

@@ -15,7 +15,7 @@ ODD = {
 }
 ELSEWHERE = {
     *("G30", "G27", "M18", "M84", "M98", "M401", "M402", "M600", "M701", "M702", "M0", "M1"),
-    *("M125", "M585", "M675", "G38"),
+    *("M125", "M582", "M585", "M675", "G38"),
 }
 KNOWN = {
     *(
@@ -27,6 +27,8 @@ KNOWN = {
         "G94",
         "M3",
         "M5",
+        "M30",
+        "M36",
         "M42",
         "M73",
         "M104",
@@ -82,7 +84,7 @@ def _bare(line: str, cnc: bool) -> str:
 def _first(line: str) -> tuple[str, str]:
     """The first command, and what stands behind it."""
     name = line[1:].lstrip(" 0123456789.")
-    if line[0] in "Mm" and line[1:].strip()[:3] in ("117", "118", "291", "32 ", "23 "):
+    if line[:4].upper() == "M117" and line[4:].lstrip()[:1] != '"':
         return line, ""
     quoted = braces = 0
     for k in range(len(line) - len(name), len(line)):
