@@ -94,16 +94,37 @@ ODD = {
 }
 
 
-def _one(words: str, rng: random.Random) -> str:
-    return rng.choice([each.strip() for each in words.split("|")])
+def words(text: str) -> list[str]:
+    """The words of one of the texts above."""
+    return [each.strip() for each in text.split("|")]
+
+
+def _one(text: str, rng: random.Random) -> str:
+    return rng.choice(words(text))
+
+
+def with_word(firmware: str, word: str, named: bool) -> str:
+    """A program with a word in its middle; the move behind it may name all axes."""
+    behind = "G1 X-30 Y4 Z45" if named else "G1 X-30"
+    if firmware == "linuxcnc":
+        begin, e = ["G21 G90 G94", "G0 X10 Y5 Z40 F1200"], [""] * 3
+    else:
+        begin = ["G28", "G21", "G90", "M82", "G92 E0", "G1 X10 Y5 Z40 F1200"]
+        e = [" E5", " E9", " E12"]
+    moves = [behind + e[0], "G1 X30 Y-20 F900" + e[1], "G0 Z30", "G1 X-30 Z50" + e[2]]
+    return "\n".join([*begin, word, *moves]) + "\n"
+
+
+def with_modes(modes: tuple[str, ...]) -> str:
+    """A printer's program with modes in its middle; its moves stay in reach, relative or not."""
+    begin = ["G28", "G21", "G90", "M82", "G92 E0", "G1 X1 Y5 Z40 F1200"]
+    moves = ["G1 X-30 E5", "G1 X30 Y-2 E9", "G90", "M82", "G1 X-30 Z50 E12"]
+    return "\n".join([*begin, *modes, *moves]) + "\n"
 
 
 def program(firmware: str, rng: random.Random, odd: int = 0, joints: bool = False) -> str:
     """A program; with so many words that mean something else."""
-    lines = (
-        [_begin(firmware, rng, joints)] if firmware != "linuxcnc" or not joints else ["G90 G21 G94"]
-    )
-    lines = [each for line in lines for each in line.split("|") if each]
+    lines = ["G90 G21 G94"] if joints else [each for each in _begin(firmware, rng) if each]
     unit = 25.4 if "G20" in lines else 1.0
     relative = False
     lines.append(_move(firmware, rng, unit, relative, "XYZ", rapid=joints))
@@ -138,13 +159,13 @@ def program(firmware: str, rng: random.Random, odd: int = 0, joints: bool = Fals
     return rng.choice(["", "", "\ufeff"]) + end.join(lines) + rng.choice(["", end])
 
 
-def _begin(firmware: str, rng: random.Random, joints: bool) -> str:
+def _begin(firmware: str, rng: random.Random) -> list[str]:
     if firmware == "linuxcnc":
-        return rng.choice(["G21 G90 G94 G17", "G90|G21", "G17 G40 G49 G80 G90 G94", "G20"])
-    inch = [] if firmware == "klipper" else ["G20"]
-    units = rng.choice([["G21"], ["G21"], [], inch])
-    e = rng.choice(["M82|G92 E0", "M83"])
-    return "|".join(["G28", *units, "G90", e])
+        known = ["G21 G90 G94 G17"], ["G90", "G21"], ["G17 G40 G49 G80 G90 G94"], ["G20"]
+        return rng.choice(known)
+    inch = "G21" if firmware == "klipper" else "G20"
+    units = rng.choice(["G21", "G21", "", inch])
+    return ["G28", units, "G90", *rng.choice([["M82", "G92 E0"], ["M83"]])]
 
 
 def _mode(firmware: str, rng: random.Random, relative: bool) -> list[str]:

@@ -324,35 +324,23 @@ def test_a_word_that_is_passed_is_taken_to_do_no_harm(tmp_path: Path) -> None:
         corrected(tmp_path, "G1 X1 Y1 Z20\n", passed=["g2"])
 
 
-def test_extrusion_is_divided_only_where_all_versions_agree(tmp_path: Path) -> None:
-    """By the last of G90, G91, M82, M83 in Marlin 2, else by G91 or M83 in Marlin 1 and Klipper."""
-    begin, move = "G92 E0\nG1 X-70 Y-20 Z5 F900\n", "G1 X70 Y20 E10\n"
-    relative = {"M83\n": "all", "G91\nM83\n": "all", "M82\nG91\n": "MK", "M83\nG90\n": "RK"}
-    absolute = {"M82\n": "all", "G91\nG90\nM82\n": "all", "M82\nG91\nG90\n": "all"}
-    for modes, who in (
-        relative | absolute | {"G90\n": "", "": "", "M82\nG91\nM83\nG90\n": "RK"}
-    ).items():
-        for firmware in ("marlin", "reprap", "klipper"):
-            absolutely = modes.rstrip().endswith(("M82", "G90")) or firmware == "reprap"
-            line = (
-                move
-                if "G91" not in modes or modes.rfind("G90") > modes.rfind("G91")
-                else ("G1 X140 Y40 E10\n")
-            )
-            text = begin + modes + line
-            if (
-                who != "all"
-                and firmware[0].upper() not in who
-                and not (firmware == "reprap" and modes == "M82\nG91\n")
-            ):
-                with pytest.raises(pk.FileError, match="whether E is relative is not certain"):
-                    corrected(tmp_path, text, firmware=firmware)
-                continue
-            found = corrected(tmp_path, text, firmware=firmware).text
-            parts = [float(value) for value in re.findall(r"E(\S+)", found)][1:]
-            assert len(parts) > 2 and absolutely in (True, False)
-            last = parts[-1] if parts[-1] == 10.0 else sum(parts)
-            assert last == pytest.approx(10.0, abs=1e-9)
+@pytest.mark.parametrize(
+    ("firmware", "modes"),
+    [
+        ("marlin", "M83\nG90\n"),  # relative in Marlin 1, absolute in Marlin 2
+        ("marlin", "G91\nM82\nG91\nG90\nM83\nG90\n"),
+        ("marlin", "G90\n"),  # as what was before the program left it
+        ("klipper", "G91\nG90\n"),
+        ("reprap", "G91\nG90\n"),
+    ],
+)
+def test_extrusion_that_may_be_relative_or_not_is_not_divided(
+    firmware: str, modes: str, tmp_path: Path
+) -> None:
+    text = f"{modes}G92 E0\nG1 X-70 Y-20 Z5 F900\nG1 X70 Y20 E10\n"
+    with pytest.raises(pk.FileError, match="whether E is relative is not certain"):
+        corrected(tmp_path, text, firmware=firmware)
+    assert corrected(tmp_path, text, firmware=firmware, chord=1.0).segments == 2
 
 
 def test_where_e_is_has_to_be_known_of_a_move_in_parts(tmp_path: Path) -> None:
