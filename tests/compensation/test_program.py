@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import tracemalloc
 from pathlib import Path
 from typing import Any
 
@@ -524,3 +525,39 @@ def test_bends_of_a_table_are_looked_at_wherever_they_are(
     assert found.chord_error <= 0.02
     assert off.max() > 0.9 * found.chord_error - 2e-5
     assert off.max() < 17 / 16 * found.chord_error + 2e-5  # five decimals
+
+
+@pytest.mark.slow
+def test_memory_does_not_grow_with_a_program(tmp_path: Path) -> None:
+    """But for the program itself, when it is written to a file."""
+    peaks = []
+    for count in (5_000, 15_000):
+        path = tmp_path / f"{count}.gcode"
+        lines = (f"G1 X{k % 60 - 30} Y{k % 47 - 23} Z{k % 31} F900\n" for k in range(count))
+        path.write_text("".join(lines))
+        tracemalloc.start()
+        found = pk.compensate_program(
+            DELTA, DELTA.replace(OFF), path, firmware="marlin", chord=1.0, out=tmp_path / "new"
+        )
+        peaks.append(tracemalloc.get_traced_memory()[1] - path.stat().st_size)
+        tracemalloc.stop()
+        assert found.moves == count and found.text == ""
+    assert peaks[1] < 1.1 * peaks[0]
+
+
+def test_a_program_is_written_as_a_whole_or_not_at_all(tmp_path: Path) -> None:
+    """Piece by piece it is the program that the result holds."""
+    many = "".join(f"G1 X{k % 60 - 30} Y{k % 47 - 23} Z{k % 31} F900\n" for k in range(4_200))
+    path, out = tmp_path / "long.gcode", tmp_path / "new.gcode"
+    path.write_text(many)
+    options: Any = {"firmware": "marlin", "chord": 1.0}
+    machine = DELTA.replace(OFF)
+    found = pk.compensate_program(DELTA, machine, path, out=out, **options)
+    whole = pk.compensate_program(DELTA, machine, path, **options)
+    assert found.text == "" and out.read_text() == whole.text
+    assert (found.moves, found.segments) == (whole.moves, whole.segments) == (4_200, found.segments)
+    path.write_text(many + "G2 X1 Y1\n")
+    before = out.read_bytes()
+    with pytest.raises(pk.FileError, match="line 4201: G2 cannot be followed"):
+        pk.compensate_program(DELTA, machine, path, out=out, **options)
+    assert out.read_bytes() == before and len(list(tmp_path.iterdir())) == 2
