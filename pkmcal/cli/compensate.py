@@ -109,7 +109,7 @@ def compensate(
 
     Or a program (.ngc, .nc, .gcode, .g, .tap) for a controller that has other numbers than the
     calibrated machine: its G0 and G1 are written with poses that lead where they are meant, long
-    ones in parts, and nothing else is changed.
+    ones in parts, and nothing else is changed. --firmware says what its words mean.
 
     Exit code 1: a limb cannot reach some of the poses, or a measured error is implausibly large.
 

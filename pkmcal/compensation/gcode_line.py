@@ -173,6 +173,8 @@ def _command(code: str, dialect: Dialect) -> tuple[Command, int]:
         name = shown = macro.upper()
     elif letter:
         name, shown = dialect.name(letter, number or ""), letter + (number or "")
+    if macro and dialect.several and name not in dialect.words and _NEXT.search(name):
+        raise Unclear(f"{shown} has a G or M in it, with which {dialect.title} begins a command")
     if dialect.capitals and letter and letter.islower():
         raise Unclear(f"{shown} is not in capitals: {dialect.title} may not read it")
     quoted = dialect.several and code[head.end() :].lstrip().startswith('"')
