@@ -1,8 +1,8 @@
 """Words of Marlin, after its list of G-codes (marlinfw.org/meta/gcode, 2.1).
 
 It reads one command a line. In Marlin 2 the last of G90, G91, M82 and M83 says whether E is
-relative; in Marlin 1 it is with G91 or M83. G80 maps the bed in some of its descendants. Parentheses and lower case are read only where it was
-built so.
+relative; in Marlin 1 it is with G91 or M83. Parentheses and lower case are read only where it was
+built so. G80 maps the bed in some of its descendants.
 """
 
 from pkmcal.compensation.gcode_dialect import Dialect, table

@@ -57,7 +57,8 @@ ODD = {
         G1\u00a0X5 | M117 "a" G1 X5 | M118 ;G1 X5 | @pause | G1 X5 E | G1 X | M104 S1 G1 X5 |
         G10 L2 X1 | M82 G1 X5 | G91 X5 | T1 G1 X5 | N4 | G1 X5 // a | M203 X5 G1 X6 | m82 | g91 |
         G2 X1 Y1 I1 | G92 X0 | G92 | M206 X1 | M218 T1 X5 | M290 Z0.1 | M665 L360 | M92 X80 |
-        M501 | M502 | M420 S1 | M808 L5 | M808 | M23 a.g | M24 | M32 a.g | G29 | G80 | G33 | G53 | G55 |
+        M501 | M502 | M420 S1 | M808 L5 | M808 | M23 a.g | M24 | M32 a.g | G29 | G80 | G33 |
+        G53 | G55 |
         G91.1 | G90.1 | g1 x9 | G1 X5 Y5 Z5 e3 | G1 X5 G91 | G90 G20 | G20 | G21 | M82 | M83 |
         G90 | G91 | X9 | G1 X1e-05 | G1X5Y6 | G01 X7 | G 1 X7 | N7 G1 X6 | N8G1 X6 | G1 X6*77 |
         G1 X5 (Z3) | (G1 X5) | G1 X5 X6 | G4 P5 G1 X20 | M999 X5 | FOO X5 | M605 S2 | M851 Z1 |
