@@ -254,8 +254,13 @@ CALLS: dict[str, Call] = {
     ),
     "compensate_program": (
         pk.compensate_program,
-        {"controller": pk.load("hexapod"), "calibrated": pk.load("hexapod"), "path": "a.gcode"},
-        {"controller": "robot", "calibrated": "robot", "path": "path"},
+        {
+            "controller": pk.load("hexapod"),
+            "calibrated": pk.load("hexapod"),
+            "path": "a.gcode",
+            "firmware": "marlin",
+        },
+        {"controller": "robot", "calibrated": "robot", "path": "path", "firmware": "word"},
     ),
     "read_measurements": (pk.read_measurements, {"path": "probe.csv"}, {"path": "path"}),
     "Tracker": (

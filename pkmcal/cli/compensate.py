@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from os import PathLike
 from pathlib import Path
-from typing import Annotated, cast
+from typing import Annotated, cast, get_args
 
 import numpy as np
 import typer
 
 import pkmcal as pk
+from pkmcal.arguments import word
 from pkmcal.arrays import FloatArray
 from pkmcal.cli.inputs import Inputs
 from pkmcal.cli.options import Force, Json, ParallelRobot, Seed
 from pkmcal.cli.output import Output, say
 from pkmcal.cli.rows import POSE_UNITS, numbers_on_line
 from pkmcal.compensation.compensate import Method, Orientation
+from pkmcal.compensation.program import GcodeFirmware
 from pkmcal.core.library import POSE
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.csv_table import Table
@@ -87,6 +90,18 @@ def compensate(
             metavar="X,Y,Z,A,B,C", help="Of a program: the pose where it begins, mm and deg."
         ),
     ] = None,
+    firmware: Annotated[
+        str | None,
+        typer.Option(metavar="WORD", help=f"Of a program: {', '.join(get_args(GcodeFirmware))}."),
+    ] = None,
+    passed: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--pass",
+            metavar="WORD",
+            help="Of a program: a word that moves nothing and changes no mode and no coordinate.",
+        ),
+    ] = None,
     force: Force = False,
     json: Json = False,
 ) -> int:
@@ -94,7 +109,7 @@ def compensate(
 
     Or a program (.ngc, .nc, .gcode, .g, .tap) for a controller that has other numbers than the
     calibrated machine: its G0 and G1 are written with poses that lead where they are meant, long
-    ones in parts, and nothing else is changed.
+    ones in parts, and nothing else is changed. --firmware says what its words mean.
 
     Exit code 1: a limb cannot reach some of the poses, or a measured error is implausibly large.
 
@@ -107,8 +122,26 @@ def compensate(
         beside = {"orientation": orientation, "match": match, "common": common, "bounds": bounds}
         _refuse(beside | {"seed": seed, "method": method != "exact"}, "a program")
         calibrated = load_parallel(read.robot(str(measured)))
-        return _program(machine, calibrated, desired, chord, joints, start, out, read, force, json)
-    _refuse({"chord": chord, "joints": joints, "start": start}, "a table of poses")
+        if out is None:
+            raise ArgumentError("--out is needed: the folder for the corrected program")
+        if firmware is None:
+            known = ", ".join(get_args(GcodeFirmware))
+            raise ArgumentError(f"--firmware is needed, words mean different things: {known}")
+        program = read.file(desired)
+        correct = partial(
+            pk.compensate_program,
+            machine,
+            calibrated,
+            program,
+            firmware=word("--firmware", firmware, get_args(GcodeFirmware)),
+            chord=0.01 if chord is None else chord,
+            joints=joints,
+            start=_start(start),
+            passed=passed or (),
+        )
+        return _program(desired, Output(out, [desired.name], read, force), json, correct)
+    of_programs = {"chord": chord, "joints": joints, "start": start}
+    _refuse(of_programs | {"firmware": firmware, "pass": passed}, "a table of poses")
     poses = read_poses(read.file(desired), machine)
     reached = read_reached(read.file(measured))
     output = None if out is None else Output(out, ["corrected.csv"], read, force)
@@ -151,39 +184,28 @@ def _refuse(given: Mapping[str, object], what: str) -> None:
 
 
 def _program(
-    machine: Robot,
-    calibrated: Robot,
-    path: Path,
-    chord: float | None,
-    joints: bool,
-    start: str | None,
-    out: Path | None,
-    read: Inputs,
-    force: bool,
-    json: bool,
+    path: Path, output: Output, json: bool, correct: Callable[..., pk.CorrectedProgram]
 ) -> int:
-    begin = None
-    if start is not None:
-        row = numbers_on_line("--start", start, POSE_UNITS, rad=False)
-        if row is None:
-            raise ArgumentError(f"--start must be six numbers, found {start!r}")
-        begin = row[0]
-    if out is None:
-        raise ArgumentError("--out is needed: the folder for the corrected program")
-    program = read.file(path)
-    output = Output(out, [path.name], read, force)
-    found = pk.compensate_program(
-        machine,
-        calibrated,
-        program,
-        chord=0.01 if chord is None else chord,
-        joints=joints,
-        start=begin,
-    )
+    """Write a corrected program."""
     with output.draft() as draft:
-        (draft / path.name).write_bytes(found.text.encode("utf-8", errors="surrogateescape"))
+        if json:  # holds it, too
+            found = correct()
+            (draft / path.name).write_bytes(found.text.encode("utf-8", errors="surrogateescape"))
+        else:
+            found = correct(out=draft / path.name)
     say(as_json(found) if json else f"{found}\nprogram: {output.paths[0]}")
     return 0
+
+
+def _start(text: str | None) -> FloatArray | None:
+    """The pose where a program begins."""
+    if text is None:
+        return None
+    row = numbers_on_line("--start", text, POSE_UNITS, rad=False)
+    if row is None:
+        raise ArgumentError(f"--start must be six numbers, found {text!r}")
+    pose: FloatArray = row[0]
+    return pose
 
 
 def read_reached(path: str | PathLike[str]) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Plain G-code: moves of a program, and the program with other numbers in them.
+"""Plain G-code: the moves of a program, line by line, as one firmware reads them.
 
 Own code, for what is not a move has to stay to the character, and what cannot be followed has to be
 refused with its line: readers of G-code that are published lose one or the other.
@@ -6,61 +6,29 @@ refused with its line: readers of G-code that are published lose one or the othe
 
 from __future__ import annotations
 
-import re
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+import io
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
-import numpy as np
-
 from pkmcal.arrays import FloatArray
-from pkmcal.exceptions import FileError
-from pkmcal.files.text_lines import MARK, lines_of
+from pkmcal.compensation.gcode_dialect import AXES, NEVER_PASSED, Dialect, Meaning
+from pkmcal.compensation.gcode_line import Command, Unclear, Word, commands
+from pkmcal.exceptions import ArgumentError, FileError
+from pkmcal.files.text_lines import MARK
 
-_WORD = re.compile(r"([A-Za-z])[ \t]*([-+]?(?:\d+\.?\d*|\.\d+))")
-_REMARK = re.compile(r"\([^)]*\)|;.*")
-_PLAIN = re.compile(rf"\s*(?:{_WORD.pattern}\s*)*")
-_NUMBERED = r"\s*(?:N\s*\d+\s*)?"
-_SETTING = re.compile(_NUMBERED + r"M\s*\d\d", re.IGNORECASE)  # its X, Y, Z are no axes
-_MESSAGE = re.compile(_NUMBERED + r"M\s*(?:0*23|28|30|32|36|117|118|291|928)\b.*", re.IGNORECASE)
-_OFFSET = re.compile(
-    _NUMBERED + r"(M\s*(?:206|218|290|428|556|579)\b|SET_GCODE_OFFSET\b)", re.IGNORECASE
-)
-_RESTORED = re.compile(
-    _NUMBERED + r"(RESTORE_GCODE_STATE\b|M\s*(?:72|121)\b|M\s*73\s*$)", re.IGNORECASE
-)
-_BLOCK = re.compile(r"\s*(if|elif|else|while)\b", re.IGNORECASE)
-# what may move the machine: macros, all but those that set something, and changes of tools
-_MACRO = re.compile(
-    r"\s*(?!SET_|EXCLUDE_OBJECT|echo\b|global\b|set\b|var\b)([A-Za-z_]{2,}\w*)", re.IGNORECASE
-)
-_CHANGE = re.compile(_NUMBERED + r"(T\s*\d+|M\s*(?:0*6|9[6-9]|125|600|701|702))\b", re.IGNORECASE)
-_GEOMETRY = re.compile(_NUMBERED + r"(M\s*66[569])\b(?=.*[A-Z])", re.IGNORECASE)
-_HOMED = re.compile(_NUMBERED + r"G\s*28(?:\s*[A-Z])*\s*", re.IGNORECASE)  # axes without numbers
-_CHECKSUM = re.compile(r".*\*\s*\d+\s*")
-_NAMED = re.compile(r"\s*[A-Za-z_]{2,}")  # a macro, such as PRINT_START BED=60
 _INCH = 25.4
-_LOST = {28.0, 28.1, 29.0, 30.0, 30.1, 32.0}  # homing and probing: the machine is elsewhere then
-_PASSED = {4.0, 10.0, 11.0, 17.0, 18.0, 19.0, 40.0, 49.0, 54.0, 61.0, 61.1, 64.0, 69.0, 80.0}
-_PASSED |= {94.0, 98.0, 99.0}
-_MODES = {20.0, 21.0, 90.0, 91.0}
-
-
-class Word(NamedTuple):
-    """Where a word begins in its line, and its number begins and ends."""
-
-    at: int
-    start: int
-    end: int
-    value: float
 
 
 class Extrusion(NamedTuple):
-    """The E word of a move: its value, the one before it, and whether it counts from there."""
+    """The E word of a move, where E was before, and whether the word counts from there.
+
+    None where that is not known.
+    """
 
     word: Word
-    before: float
-    relative: bool
+    before: float | None
+    relative: bool | None
 
 
 @dataclass
@@ -77,12 +45,11 @@ class Move:
         In mm and deg, absolute.
     known : bool
         Whether it is known where the move begins.
-    fresh : bool
-        The first one, and the first after homing: the controller is not where a move ended.
+    fresh : tuple of float or None, or None
+        Where the controller is before the first move, and before one behind homing or a macro;
+        None of an axis of which that is not known. None if a move ended there.
     words : dict
         Its axis words by their letters.
-    end : int
-        Where further words go in its line.
     relative : bool
         G91.
     scale : float
@@ -93,6 +60,12 @@ class Move:
         Mm or deg a minute; 0 where none was stated.
     feed_word : Word or None
         Its F word.
+    per_turn : bool
+        G95: the feed is of a turn of the spindle.
+    begins_times : bool
+        Whether G93 has to stand before it, where moves are to state their times.
+    behind : str
+        What acts behind it in its line.
     """
 
     line: int
@@ -100,243 +73,314 @@ class Move:
     start: FloatArray
     target: FloatArray
     known: bool
-    fresh: bool
+    fresh: tuple[float | None, ...] | None
     words: dict[str, Word]
-    end: int
     relative: bool
     scale: float
     extrusion: Extrusion | None
     feed: float
     feed_word: Word | None
+    per_turn: bool
+    begins_times: bool
+    behind: str
 
 
 @dataclass
 class _State:
-    """What a controller remembers from line to line."""
+    """What a controller remembers from line to line.
+
+    Attributes
+    ----------
+    known : set of str
+        Axes of which it is known where they are.
+    lost_by : str
+        The word behind which that is not known.
+    own, last : bool or None
+        M83; whether the last of G90, G91, M82 and M83 was G91 or M83.
+    timed : bool
+        Whether moves state their times.
+    """
 
     at: FloatArray
+    known: set[str]
+    lost_by: str = ""
     fresh: bool = True
-    motion: float | None = None
+    straight: bool | None = None
     relative: bool = False
     scale: float = 1.0
     feed: float = 0.0
-    extruded: float = 0.0
-    extrusion_relative: bool | None = None
-    named: set[str] = field(default_factory=set)  # lengths that were stated since it was lost
+    per_turn: bool = False
+    extruded: float | None = None
+    own: bool | None = None
+    last: bool | None = None
+    timed: bool = False
 
 
 class Program:
-    """The lines of a program, and its moves.
+    """A program as a firmware reads it.
 
     Parameters
     ----------
-    text : str
+    content : bytes
         The program.
+    place : str
+        What messages call it.
+    dialect : Dialect
+        The firmware.
     letters : sequence of str
         The axes that it moves, such as ``"XYZ"``.
     start : ndarray (axes,)
         Where they are at first and after homing, mm and deg.
     stated : bool
         Whether that is known of the lengths; else a program has to begin with all of them.
-    place : str
-        What messages call it.
+    passed : collection of str
+        Words that move nothing and change no mode, as the user says; of refused words, that they
+        do not what they are refused for.
+    times : bool
+        Whether moves are to state their times: G94 becomes G93.
 
     Attributes
     ----------
-    lines : list of str
-        Its lines with their ends.
-    moves : list of Move
-        Its moves.
+    dialect : Dialect
+        The firmware.
     left : dict
-        Macros and changes of tools, which may move the machine, by the line where each is first.
+        Words that may move the machine, by the line where each is first.
 
     Raises
     ------
-    FileError
-        What cannot be followed, with its line: arcs, cycles, offsets, parameters.
+    ArgumentError
+        A word that cannot be passed.
     """
 
     def __init__(
-        self, text: str, letters: Sequence[str], start: FloatArray, stated: bool, place: str
+        self,
+        content: bytes,
+        place: str,
+        dialect: Dialect,
+        letters: Sequence[str],
+        start: FloatArray,
+        stated: bool,
+        passed: Collection[str] = (),
+        times: bool = False,
     ) -> None:
-        self.lines = lines_of(text)
-        self.moves: list[Move] = []
         self.left: dict[str, int] = {}
-        self._letters = letters
-        self._start = start
-        self._stated = stated
-        self._lengths = set() if stated else set("XYZ") & set(letters)
-        self._place = place
-        state = _State(start.copy())
-        for i, line in enumerate(self.lines):
-            self._read(i, line, state)
+        self.dialect = dialect
+        self._content, self._place = content, place
+        self._letters, self._start, self._stated = letters, start, stated
+        self._passed = frozenset(name.upper() for name in passed)
+        self._times = times
+        for name in sorted(self._passed):
+            if dialect.words.get(name) in NEVER_PASSED:
+                raise ArgumentError(
+                    f"passed: {name} is a word of {dialect.title} that cannot be passed"
+                )
 
     def wrong(self, line: int, message: str) -> FileError:
         """What is wrong with a line, counted from 0."""
         return FileError(f"{self._place}, line {line + 1}: {message}")
 
-    def _read(self, i: int, line: str, state: _State) -> None:
-        code = _REMARK.sub(lambda found: " " * len(found[0]), line.rstrip("\r\n"))
-        code = code.replace(MARK, " ", 1) if i == 0 else code
-        if _MESSAGE.match(code):
-            return
-        if offset := _OFFSET.match(code):
-            raise self.wrong(
-                i, f"{offset[1]} moves the origin, or skews axes, which cannot be followed"
+    def read(self) -> Iterator[tuple[str, Move | None]]:
+        """Its lines with their ends, each with its move.
+
+        Raises
+        ------
+        FileError
+            What cannot be followed, with its line: arcs, cycles, offsets, parameters.
+        """
+        state = _State(self._start, set())
+        self._home(state)
+        marked: bool | None = None  # whether the program begins with %
+        marks, end, ending = 0, "", "\n"
+        lines = io.TextIOWrapper(
+            io.BytesIO(self._content), "utf-8", errors="surrogateescape", newline=""
+        )
+        for i, line in enumerate(lines):
+            code = line.rstrip("\r\n")
+            code = code.replace(MARK, " ", 1) if i == 0 else code
+            marked = code.strip() == "%" if marked is None and code.strip() else marked
+            if code.strip() == "%" and self.dialect.block:
+                marks += bool(marked)
+                yield from self._end_of_times(state, line)
+            if marks < 2:  # what stands behind the second is not executed
+                try:
+                    line, move = self._line(i, line, code, state)
+                except Unclear as error:
+                    raise self.wrong(i, str(error)) from None
+            yield line, move if marks < 2 else None
+            end = line[len(line.rstrip("\r\n")) :]
+            ending = end or ending
+        if state.timed and not end:
+            yield ending, None
+        yield from self._end_of_times(state, ending)
+
+    @staticmethod
+    def _end_of_times(state: _State, line: str) -> Iterator[tuple[str, None]]:
+        """G94 behind the last move: no controller is left in G93."""
+        if state.timed:
+            state.timed = False
+            yield "G94" + (line[len(line.rstrip("\r\n")) :] or "\n"), None
+
+    def _line(self, i: int, line: str, code: str, state: _State) -> tuple[str, Move | None]:
+        """A line as it is to be written, and its move."""
+        moves = []
+        for command in commands(code, self.dialect):
+            meaning = self._meaning(command)
+            if meaning is Meaning.HOMES:
+                self._home(state)
+            elif meaning is Meaning.MOVES:
+                self.left.setdefault(command.shown.upper(), i)
+                state.known, state.fresh, state.extruded = set(), True, None
+                state.lost_by = command.shown.upper()
+            elif meaning is Meaning.FOLLOWED and command.name in ("", "G0", "G1"):
+                moves += self._move(i, command, state)
+            elif meaning is Meaning.FOLLOWED:
+                self._mode(command, state)
+                if self._times and command.name == "G94" and command.number is not None:
+                    at = command.number.start
+                    line = line[:at] + line[at:].replace("94", "93", 1)
+                    state.timed = True
+        if len(moves) > 1:
+            raise Unclear("two moves stand in it: give each a line of its own")
+        return line, moves[0] if moves else None
+
+    def _meaning(self, command: Command) -> Meaning:
+        """What a command does to the poses of this program."""
+        if not command.name:
+            return Meaning.FOLLOWED
+        shown = command.shown.upper()
+        meaning = self.dialect.meaning(command.name, command.letters)
+        axes = command.letters & AXES
+        if {command.name, shown} & self._passed:  # what is refused may move the machine, too
+            return Meaning.MOVES if meaning is not None and meaning.refused else Meaning.HARMLESS
+        if meaning is not None and meaning.refused:
+            unless = "" if meaning in NEVER_PASSED else f"; if not here: --pass {shown}"
+            raise Unclear(f"{command.shown} {meaning.value}{unless}")
+        base = command.name.partition(".")[0]
+        if meaning is None and self.dialect.words.get(base) is Meaning.FOLLOWED:
+            raise Unclear(f"{shown} may be read as {base}")
+        if meaning is None and axes:
+            raise Unclear(
+                f"{shown} has axis letters and is none of {self.dialect.title}'s listed words;"
+                f" if it moves nothing and changes no mode: --pass {shown}"
             )
-        if restored := _RESTORED.match(code):
-            raise self.wrong(i, f"{restored[1]} restores modes, which cannot be followed")
-        if block := _BLOCK.match(code):
-            raise self.wrong(i, f"{block[1]}: conditions and loops cannot be followed")
-        if geometry := _GEOMETRY.match(code):
-            raise self.wrong(i, f"{geometry[1]} gives the controller other numbers than ROBOT has")
-        if _HOMED.fullmatch(code):
-            code = ""
-            self._lose(state)
-        if left := _MACRO.match(code) or _CHANGE.match(code):
-            self.left.setdefault(left[1], i)
-        if _NAMED.match(code) or not code.strip() or code.strip() == "%":
-            return
-        plain = _PLAIN.fullmatch(code)
-        if _SETTING.match(code) and not (plain and re.search("[Gg]", code)):
-            code = code if plain else ""  # a text, such as that of M117
-            words = self._words(code)
-            self._modes(words, state)
-            return
-        if _CHECKSUM.fullmatch(code):
-            raise self.wrong(i, "the checksum would no longer be right: take checksums out")
-        if not plain:
-            raise self.wrong(i, f"{line.strip()!r:.40} is no plain G-code: words and numbers alone")
-        words = self._words(code)
-        axes = {letter: word for letter, word in words if letter in "XYZABCUVW"}
-        self._require_one_meaning(i, words)
-        codes = [word.value for letter, word in words if letter == "G"]
-        for value in codes:
-            self._code(i, value, axes, words, state)
-        self._modes(words, state)
-        if any(value in _LOST for value in codes):
-            self._lose(state)
-        elif 92.0 not in codes and 4.0 not in codes:
-            self._move(i, axes, words, state)
+        if meaning is Meaning.MOVES and axes and self.dialect.block:
+            raise Unclear(f"{shown} with axis words goes by a point that is not corrected")
+        return meaning or Meaning.MOVES
 
-    def _require_one_meaning(self, i: int, words: list[tuple[str, Word]]) -> None:
-        """Refuse lines of which controllers make different things."""
-        seen: set[str] = set()
-        for letter, word in words:
-            motion = letter == "G" and word.value in (0.0, 1.0)
-            name = "G0 or G1" if motion else letter
-            if name in seen and name not in ("G", "M"):
-                raise self.wrong(i, f"{name} stands twice in it")
-            if letter == "G" and word.value in _MODES and seen & set("XYZABCUVW"):
-                raise self.wrong(i, f"G{word.value:g} stands behind axis words")
-            seen.add(name)
-
-    def _lose(self, state: _State) -> None:
-        """The machine was homed or probed."""
-        state.at, state.fresh, state.named = self._start.copy(), True, set()
+    def _home(self, state: _State) -> None:
+        """The machine is where it was at first: angles as at home, lengths if they are stated."""
+        state.at, state.fresh, state.lost_by = self._start, True, ""
+        state.known = {each for each in self._letters if self._stated or each in "ABC"}
 
     @staticmethod
-    def _words(code: str) -> list[tuple[str, Word]]:
-        return [
-            (found[1].upper(), Word(found.start(), *found.span(2), float(found[2])))
-            for found in _WORD.finditer(code)
-        ]
+    def _mode(command: Command, state: _State) -> None:
+        name, words = command.name, command.words or {}
+        if name == "G92" and set(words) != {"E"}:
+            raise Unclear("G92 moves the origin, which cannot be followed")
+        if name == "G92":
+            state.extruded = words["E"].value
+        elif words:
+            raise Unclear(f"{min(words)} is no word of {command.shown}")
+        elif name in ("G20", "G21"):
+            state.scale = _INCH if name == "G20" else 1.0
+            state.extruded = None  # it is of the units before
+        elif name in ("G90", "G91"):
+            state.relative = state.last = name == "G91"
+        elif name in ("M82", "M83"):
+            state.own = state.last = name == "M83"
+        elif name in ("G94", "G95"):
+            state.per_turn = name == "G95"
+        elif name == "G80":
+            state.straight = None
+        elif name in ("M2", "M30"):
+            state.timed = False
 
-    @staticmethod
-    def _modes(words: list[tuple[str, Word]], state: _State) -> None:
-        for letter, word in words:
-            if letter == "M" and word.value in (82.0, 83.0):
-                state.extrusion_relative = word.value == 83.0
-            if letter == "F":
-                state.feed = word.value * state.scale
-
-    def _code(
-        self,
-        i: int,
-        value: float,
-        axes: dict[str, Word],
-        words: list[tuple[str, Word]],
-        state: _State,
-    ) -> None:
-        letters = {letter for letter, _ in words}
-        if value in (0.0, 1.0):
-            state.motion = value
-        elif value in (20.0, 21.0):
-            state.scale = _INCH if value == 20.0 else 1.0
-        elif value in (90.0, 91.0):
-            state.relative = value == 91.0
-        elif value == 92.0:
-            if axes or "E" not in letters:
-                raise self.wrong(i, "G92 moves the origin, which cannot be followed")
-            state.extruded = next(word.value for letter, word in words if letter == "E")
-        elif value not in _PASSED | _LOST:
-            raise self.wrong(i, f"G{value:g} cannot be followed: lines and rapid moves alone are")
-        elif value == 10.0 and letters & {"L", *axes}:
-            raise self.wrong(i, "G10 sets offsets, which cannot be followed")
-        elif value == 80.0:
-            state.motion = None
-
-    def _move(
-        self, i: int, axes: dict[str, Word], words: list[tuple[str, Word]], state: _State
-    ) -> None:
-        extrusion = self._extrusion(words, state)
+    def _move(self, i: int, command: Command, state: _State) -> list[Move]:
+        """The move of a G0 or G1, or of words alone; none if no axis moves."""
+        words = command.words or {}
+        axes = {letter: word for letter, word in words.items() if letter in AXES}
+        unknown = words.keys() - AXES - self.dialect.letters
+        if not command.name and (axes or not self.dialect.block):
+            if state.straight is None or not self.dialect.block:
+                raise Unclear("axis words without G0 or G1 before them")
+        elif command.name:
+            state.straight = command.name == "G1"
+        if unknown:
+            raise Unclear(f"{min(unknown)} is no word of {command.shown} that is followed")
+        feed = words.get("F")
+        state.feed = state.feed if feed is None else feed.value * state.scale
+        extrusion = self._extrusion(words.get("E"), state)
         if not axes:
-            return
-        foreign = set(axes) - set(self._letters)
+            return []
+        foreign = axes.keys() - set(self._letters)
         if foreign:
             letters = "".join(self._letters)
-            raise self.wrong(i, f"{min(foreign)} is no axis of the robot, which has {letters}")
-        if state.motion is None:
-            raise self.wrong(i, "axis words without G0 or G1 before them")
-        target = state.at.copy()
-        for letter, word in axes.items():
-            k = self._letters.index(letter)
-            value = word.value * (state.scale if letter in "XYZ" else 1.0)
-            target[k] = state.at[k] + value if state.relative else value
-        state.named |= set(axes) if not state.relative else set()
-        unknown = sorted(self._lengths - state.named)
-        if unknown:
-            raise self.wrong(
-                i,
-                f"where {' and '.join(unknown)} is, is not known here: state the pose at the start,"
-                " or let the first move name X, Y and Z",
-            )
-        feed = next((word for letter, word in words if letter == "F"), None)
-        self.moves.append(
+            raise Unclear(f"{min(foreign)} is no axis of the robot, which has {letters}")
+        start, known = state.at, set(self._letters) <= state.known
+        fresh = self._fresh(state)
+        state.at = self._target(axes, state)
+        begins_times = self._times and not state.timed
+        state.fresh, state.timed = False, self._times
+        return [
             Move(
                 line=i,
-                straight=state.motion == 1.0,
-                start=state.at,
-                target=target,
-                known=self._stated or not state.fresh,
-                fresh=state.fresh,
+                straight=bool(state.straight),
+                start=start,
+                target=state.at,
+                known=known and (self._stated or fresh is None),
+                fresh=fresh,
                 words=axes,
-                end=max(word.end for word in axes.values()),
                 relative=state.relative,
                 scale=state.scale,
                 extrusion=extrusion,
                 feed=state.feed,
                 feed_word=feed,
+                per_turn=state.per_turn,
+                begins_times=begins_times,
+                behind=command.behind,
             )
-        )
-        state.at, state.fresh = target, False
+        ]
 
-    def _extrusion(self, words: list[tuple[str, Word]], state: _State) -> Extrusion | None:
-        """The E word of a move; G91 makes E relative in some firmware and not in other."""
-        word = next((word for letter, word in words if letter == "E"), None)
+    def _fresh(self, state: _State) -> tuple[float | None, ...] | None:
+        """Where the controller is, if that is not where a move ended."""
+        if not state.fresh:
+            return None
+        return tuple(
+            float(value) if letter in state.known else None
+            for letter, value in zip(self._letters, state.at, strict=True)
+        )
+
+    def _target(self, axes: dict[str, Word], state: _State) -> FloatArray:
+        """Where a move ends."""
+        if not state.relative:
+            state.known |= axes.keys()
+        unknown = [letter for letter in self._letters if letter not in state.known]
+        if unknown:
+            where = f"where {' and '.join(unknown)} is, is not known here"
+            if state.lost_by:
+                passed = f"; if it moves nothing and changes no mode: --pass {state.lost_by}"
+                unless = "" if state.lost_by in self._passed else passed
+                raise Unclear(f"{where}, behind {state.lost_by}: name all axes{unless}")
+            raise Unclear(
+                f"{where}: state the pose at the start, or let the first move name X, Y and Z"
+            )
+        target: FloatArray = state.at.copy()
+        for letter, word in axes.items():
+            k = self._letters.index(letter)
+            value = word.value * (state.scale if letter in "XYZ" else 1.0)
+            target[k] = target[k] + value if state.relative else value
+        return target
+
+    def _extrusion(self, word: Word | None, state: _State) -> Extrusion | None:
+        """The E word of a move, as far as all versions of the firmware agree about it."""
         if word is None:
             return None
-        relative = bool(state.extrusion_relative)
+        relative = self.dialect.e_is_relative(state.own, state.relative, state.last)
         before = state.extruded
-        if not relative:
+        if relative is False:
             state.extruded = word.value
-        if state.relative and state.extrusion_relative is None:
-            before = np.nan  # not to be divided
+        elif relative and before is not None and self.dialect.adds_relative:
+            state.extruded = before + word.value
+        else:
+            state.extruded = None
         return Extrusion(word, before, relative)
-
-
-def number(value: float, decimals: int) -> str:
-    """A number of G-code: no more decimals than it needs."""
-    text = f"{value:.{decimals}f}"
-    text = text.rstrip("0").rstrip(".") if "." in text else text
-    return "0" if text in ("-0", "") else text

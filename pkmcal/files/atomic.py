@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import secrets
 import time
+from collections.abc import Iterable
 from os import PathLike
 from pathlib import Path
 
@@ -35,6 +36,24 @@ def write_whole(path: str | PathLike[str], content: str | bytes) -> None:
         The folder does not exist or cannot be written, the disk is full: with the path; what was
         there before is untouched.
     """
+    write_pieces(path, [content.encode() if isinstance(content, str) else content])
+
+
+def write_pieces(path: str | PathLike[str], pieces: Iterable[bytes]) -> None:
+    """Write a file as `write_whole` does, of pieces that are made one after the other.
+
+    Parameters
+    ----------
+    path : str or path
+        Where to write; an existing file is replaced when all pieces are made.
+    pieces : iterable of bytes
+        What to write.
+
+    Raises
+    ------
+    OSError
+        As of `write_whole`.
+    """
     path = arguments.path("path", path)
     place = Path(os.path.realpath(path))
     if not place.parent.is_dir():
@@ -44,7 +63,7 @@ def write_whole(path: str | PathLike[str], content: str | bytes) -> None:
     _sweep(place.parent)
     beside = place.with_name(_PART.format(secrets.token_hex(8)))
     try:
-        _write(beside, content.encode() if isinstance(content, str) else content)
+        _write(beside, pieces)
         if place.exists():
             os.chmod(beside, place.stat().st_mode & 0o7777)
         os.replace(beside, place)
@@ -57,9 +76,10 @@ def write_whole(path: str | PathLike[str], content: str | bytes) -> None:
         beside.unlink(missing_ok=True)
 
 
-def _write(path: Path, content: bytes) -> None:
+def _write(path: Path, pieces: Iterable[bytes]) -> None:
     with open(path, "xb") as file:
-        file.write(content)
+        for piece in pieces:
+            file.write(piece)
         file.flush()
         os.fsync(file.fileno())
 

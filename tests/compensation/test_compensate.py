@@ -333,7 +333,9 @@ def test_corrections_are_those_at_the_turn_that_is_commanded(
     found = pk.compensate(robot, desired, reached)
     assert before > 1.0 and np.abs(reached(found.actuators) - desired).max() < 5e-3 * before
     program = tmp_path / "across.gcode"
-    program.write_text("G90\nG1 X-250 Y60 F600\nG1 X-250 Y-60\n")
-    text = pk.compensate_program(robot, real, program, joints=True, chord=0.1).text
+    program.write_text("G90\nG0 X-250 Y60\nG1 X-250 Y-60 F600\n")
+    text = pk.compensate_program(
+        robot, real, program, joints=True, chord=0.1, firmware="linuxcnc"
+    ).text
     angles = np.array([float(word[1:]) for word in text.split() if word[0] == "X"])
     assert np.abs(np.diff(angles)).max() < 10.0  # deg: it goes on

@@ -1,0 +1,146 @@
+"""The form of a firmware's table: what each word of G-code means to it."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Literal
+
+AXES = frozenset("XYZABCUVW")
+_OF_OFFSETS = AXES | {"L"}
+Rule = Literal["M82 M83", "either", "last"]
+
+
+class Meaning(Enum):
+    """What a word does to the poses of a program; of refused words the reason."""
+
+    FOLLOWED = "moves and modes"
+    HARMLESS = "moves nothing and changes no coordinate"
+    HOMES = "the machine is where it is after homing"
+    MOVES = "may move the machine"
+    CURVE = "cannot be followed: lines and rapid moves alone are"
+    ORIGIN = "moves the origin, or skews or scales axes, which cannot be followed"
+    BED = "adds a map of the bed, which holds errors that the program corrects"
+    NUMBERS = "gives the controller other numbers than ROBOT has"
+    MODES = "restores modes, which cannot be followed"
+    FLOW = "is a condition, a loop or a call, which cannot be followed"
+    PROGRAM = "runs another program, which is not corrected"
+    MOTOR = "drives motors or parts of the machine, not poses"
+    TIMES = "states the time of a move, which each of its parts would take"
+
+    @property
+    def refused(self) -> bool:
+        """Whether a program with such a word is refused."""
+        return self not in _TAKEN
+
+
+_TAKEN = (Meaning.FOLLOWED, Meaning.HARMLESS, Meaning.HOMES, Meaning.MOVES)
+NEVER_PASSED = (
+    Meaning.FOLLOWED,
+    Meaning.CURVE,
+    Meaning.TIMES,
+    Meaning.FLOW,
+    Meaning.PROGRAM,
+)
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """How a firmware reads G-code.
+
+    Attributes
+    ----------
+    title : str
+        Its name.
+    words : dict
+        What its words mean, by name: ``"G1"``, ``"M104"``, ``"T"``, ``"SET_PIN"``.
+    texts : frozenset of str
+        Words behind which the rest of the line is a text; of several commands, if not in quotes.
+    letters : frozenset of str
+        Words that G0 and G1 may have beside axes.
+    remark : str
+        The pattern of a comment, and of texts in which none begins.
+    several : bool
+        Whether a line may have several commands, one after the other; else the first alone counts.
+    block : bool
+        Whether the words of a line act together, in an order of their own.
+    behind : frozenset of str
+        Words of a block that act behind its move.
+    offsets : dict
+        Words that set offsets where they have one of these letters.
+    extrusion : tuple of str
+        How its versions tell whether E is relative: by M82 and M83 alone, by G91 or M83
+        (``"either"``), by the last of G90, G91, M82 and M83.
+    adds_relative : bool
+        Whether an absolute E counts what was extruded relatively before.
+    exact : bool
+        Whether G01 is another word than G1.
+    capitals : bool
+        Whether some of its versions do not read lower case.
+    inverse_time : bool
+        Whether it has G93.
+    """
+
+    title: str
+    words: dict[str, Meaning]
+    texts: frozenset[str] = frozenset()
+    letters: frozenset[str] = frozenset("F")
+    remark: str = r";.*"
+    several: bool = False
+    block: bool = False
+    behind: frozenset[str] = frozenset()
+    offsets: dict[str, frozenset[str]] = field(default_factory=lambda: {"G10": _OF_OFFSETS})
+    extrusion: tuple[Rule, ...] = ()
+    adds_relative: bool = True
+    exact: bool = False
+    capitals: bool = False
+    inverse_time: bool = False
+
+    def name(self, letter: str, number: str) -> str:
+        """A word as its table has it."""
+        if letter.upper() == "T":
+            return "T"
+        return letter.upper() + (number if self.exact else f"{float(number):g}" if number else "")
+
+    def meaning(self, name: str, letters: frozenset[str]) -> Meaning | None:
+        """What a word with these letters means; None if the table has it not."""
+        if not self.offsets.get(name, frozenset()).isdisjoint(letters):
+            return Meaning.ORIGIN
+        return self.words.get(name)
+
+    def e_is_relative(self, own: bool | None, axes: bool, last: bool | None) -> bool | None:
+        """Whether E is relative; None where that is not stated, or versions differ.
+
+        Parameters
+        ----------
+        own : bool or None
+            M83; None before any of M82 and M83.
+        axes : bool
+            G91.
+        last : bool or None
+            Whether the last of G90, G91, M82 and M83 was G91 or M83.
+        """
+        either = True if axes else own
+        found = {{"M82 M83": own, "either": either, "last": last}[rule] for rule in self.extrusion}
+        return found.pop() if len(found) == 1 else None
+
+
+def table(**names: str) -> dict[str, Meaning]:
+    """A table from names in a text, by meaning in lower case; ``M3-M5`` stands for all between."""
+    found: dict[str, Meaning] = {}
+    for meaning, text in names.items():
+        for name in text.split():
+            for each in _between(name):
+                if each in found:
+                    raise ValueError(f"{each} stands twice in the table")
+                found[each] = Meaning[meaning.upper()]
+    return found
+
+
+def _between(name: str) -> list[str]:
+    """The names of a range."""
+    ends = re.fullmatch(r"([GM])(\d+)-\1(\d+)", name)
+    if ends is None:
+        return [name]
+    return [f"{ends[1]}{number}" for number in range(int(ends[2]), int(ends[3]) + 1)]

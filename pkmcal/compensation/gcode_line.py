@@ -1,0 +1,209 @@
+"""A line of G-code as the commands that a firmware makes of it."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import NamedTuple
+
+from pkmcal.compensation.gcode_dialect import AXES, Dialect, Meaning
+
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"
+
+
+def _ascii(pattern: str) -> re.Pattern[str]:
+    """A pattern to which digits and spaces of other scripts are none, as to controllers."""
+    return re.compile(pattern, re.ASCII)
+
+
+_WORD = _ascii(rf"([A-Za-z])[ \t]*({_NUMBER})")
+_PLAIN = _ascii(rf"\s*(?:[A-Za-z][ \t]*{_NUMBER}\s*)*")
+_HEAD = _ascii(
+    r"\s*(?:[Nn][ \t]*\d+(?:[ \t]+|$))?"
+    r"(?:([A-Za-z_][A-Za-z_]\w*)|([GMTgmt])[ \t]*(\d+(?:\.\d+)?)?)?"
+)
+_EXPONENT = _ascii(r"[\d.][Ee][-+]?[\d.]")
+_CHECKSUM = _ascii(r".*\*\s*\d+\s*")
+_TEXT = _ascii(r'"[^"]*"?|\{[^{}]*\}')
+_NEXT = _ascii(r"[GgMm]")
+_PASSED_OVER = _ascii(r"(?<![A-Za-z_=])[GgMm](?=[ \t]*\d)")
+_LETTER = _ascii(r"(?<![A-Za-z_=])[A-Za-z](?![A-Za-z_])")
+_PROGRAM_NUMBER = _ascii(r"\s*[Oo]\s*\d+\s*")
+_REMARK_ALONE = _ascii(r"\s*\([^()]*\)\s*")
+
+
+class Word(NamedTuple):
+    """Where a word begins in its line, and its number begins and ends."""
+
+    at: int
+    start: int
+    end: int
+    value: float
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command and its words.
+
+    Attributes
+    ----------
+    name : str
+        As its firmware's table has it; empty for words that repeat the last G0 or G1.
+    shown : str
+        As it stands in the line.
+    letters : frozenset of str
+        The letters of its words.
+    words : dict
+        The numbers by their letters, of what is followed.
+    number : Word or None
+        The number of its own name, in a block.
+    behind : str
+        What acts behind it in its line.
+    """
+
+    name: str
+    shown: str
+    letters: frozenset[str] = frozenset()
+    words: dict[str, Word] | None = None
+    number: Word | None = None
+    behind: str = ""
+
+
+class Unclear(ValueError):
+    """Why a line cannot be followed."""
+
+
+def commands(line: str, dialect: Dialect) -> list[Command]:
+    """The commands of a line, in the order in which they act.
+
+    Raises
+    ------
+    Unclear
+        A line that versions of the firmware read differently, or not at all.
+    """
+    code = _compiled(dialect.remark).sub(_blank, line)
+    if not code.strip() or code.strip() == "%":
+        return []
+    return _of_block(code, dialect) if dialect.block else _in_turn(code, dialect)
+
+
+@lru_cache
+def _compiled(pattern: str) -> re.Pattern[str]:
+    return re.compile(pattern)
+
+
+def _blank(found: re.Match[str]) -> str:
+    """Spaces for a remark; a text in quotation marks stays, whatever is in it."""
+    return found[0] if found[0][0] == '"' else " " * len(found[0])
+
+
+def _of_block(code: str, dialect: Dialect) -> list[Command]:
+    """The codes of a block, and its move as the last, which has axes, F and S."""
+    if _PROGRAM_NUMBER.fullmatch(code):
+        return []
+    codes: list[Command] = []
+    motion, behind = Command("", "axis words"), ""
+    words: dict[str, Word] = {}
+    for letter, word, text in _words(code, dialect, code):
+        if letter not in ("G", "M", "T"):
+            _add(words, letter, word)
+            continue
+        command = Command(dialect.name(letter, text), letter + text, words={}, number=word)
+        if command.name in dialect.behind:
+            behind = command.name
+        if command.name not in ("G0", "G1"):
+            codes.append(command)
+        elif motion.name:
+            raise Unclear("G0 or G1 stands twice in it")
+        else:
+            motion = command
+    words.pop("N", None)
+    others = words.keys() - AXES - dialect.letters
+    if others and not codes:
+        raise Unclear(f"{min(others)} is no word of {motion.shown} that is followed")
+    letters = frozenset(words)
+    owner = next((k for k, each in enumerate(codes) if _takes_axes(each, dialect)), None)
+    if owner is not None and letters & AXES:
+        codes[owner] = replace(codes[owner], letters=letters)
+        letters -= AXES
+    words = {letter: word for letter, word in words.items() if letter in letters - others}
+    if motion.name or words:
+        codes.append(replace(motion, words=words, letters=frozenset(words), behind=behind))
+    return codes
+
+
+def _add(words: dict[str, Word], letter: str, word: Word) -> None:
+    if letter in words:
+        raise Unclear(f"{letter} stands twice in it")
+    words[letter] = word
+
+
+def _takes_axes(command: Command, dialect: Dialect) -> bool:
+    """Whether axis words of its block are a code's own, as those of G28 and G92 are."""
+    meaning = dialect.words.get(command.name)
+    return command.name[0] == "G" and meaning not in (Meaning.FOLLOWED, Meaning.HARMLESS)
+
+
+def _in_turn(code: str, dialect: Dialect) -> list[Command]:
+    """The commands of a line, each with the words behind it."""
+    if _REMARK_ALONE.fullmatch(code) and not dialect.exact:
+        return []
+    found: list[Command] = []
+    while code.strip():
+        command, end = _command(code, dialect)
+        if found and not dialect.several:
+            raise Unclear(
+                f"{dialect.title} reads one command a line and passes over {command.shown}"
+            )
+        if found:
+            found[-1] = replace(found[-1], behind=command.shown)
+        found.append(command)
+        code = " " * end + code[end:]
+    return found
+
+
+def _command(code: str, dialect: Dialect) -> tuple[Command, int]:
+    """The command that begins a line, and where it ends."""
+    head = _HEAD.match(code)
+    assert head is not None  # it may be empty
+    macro, letter, number = head.groups()
+    name, shown = "", "axis words"
+    if macro:
+        name = shown = macro.upper()
+    elif letter:
+        name, shown = dialect.name(letter, number or ""), letter + (number or "")
+    if macro and dialect.several and name not in dialect.words and _NEXT.search(name):
+        raise Unclear(f"{shown} has a G or M in it, with which {dialect.title} begins a command")
+    if dialect.capitals and letter and letter.islower():
+        raise Unclear(f"{shown} is not in capitals: {dialect.title} may not read it")
+    quoted = dialect.several and code[head.end() :].lstrip().startswith('"')
+    if name in dialect.texts and not quoted:
+        return Command(name, shown), len(code)
+    rest = _TEXT.sub(lambda found: "_" * len(found[0]), code[head.end() :])
+    following = None if macro else (_NEXT if dialect.several else _PASSED_OVER).search(rest)
+    if following is not None:
+        rest = rest[: following.start()]
+    end = head.end() + len(rest)
+    if name and dialect.words.get(name) is not Meaning.FOLLOWED:
+        return Command(name, shown, frozenset(_LETTER.findall(rest.upper()))), end
+    if _CHECKSUM.fullmatch(code):
+        raise Unclear("the checksum would no longer be right: take checksums out")
+    words: dict[str, Word] = {}
+    for each, word, _ in _words(" " * head.end() + rest, dialect, code):
+        _add(words, each, word)
+    return Command(name, shown, frozenset(words), words), end
+
+
+def _words(code: str, dialect: Dialect, line: str) -> list[tuple[str, Word, str]]:
+    """The words of plain G-code, each with its letter and the text of its number."""
+    if not _PLAIN.fullmatch(code):
+        raise Unclear(f"{line.strip()!r:.40} is no plain G-code: words and numbers alone")
+    if _EXPONENT.search(code):
+        raise Unclear("E right behind a number may be an exponent: put a space before it")
+    if dialect.capitals and code != code.upper():
+        raise Unclear(f"words that are not in capitals: {dialect.title} may not read them")
+    return [
+        (each[1].upper(), Word(each.start(), *each.span(2), float(each[2])), each[2])
+        for each in _WORD.finditer(code)
+    ]

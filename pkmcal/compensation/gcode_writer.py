@@ -1,0 +1,201 @@
+"""The lines of moves with other numbers in them, and those of their further parts."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray
+from pkmcal.compensation.commanded_machine import CommandedMachine
+from pkmcal.compensation.gcode import Move, Program
+from pkmcal.files.text_lines import MARK
+
+_DECIMALS = 5  # 10 nm, 0.04 arc seconds
+_FIGURES = 7  # of a feed
+_SLOWER = 0.02  # share by which the speed of a turning machine may differ
+
+
+class Writer:
+    """Writes moves one after the other: it knows which numbers the controller has."""
+
+    def __init__(self, program: Program, machine: CommandedMachine) -> None:
+        self._program, self._machine = program, machine
+        self._last: list[float | None] = [None] * len(machine.written)
+        self._lengths = np.array([letter in "XYZ" for letter in machine.letters])
+
+    def lines(
+        self, line: str, move: Move, points: FloatArray, commands: FloatArray, share: FloatArray
+    ) -> str:
+        """A move's line, and those of its further parts.
+
+        Parameters
+        ----------
+        line : str
+            The line of the program.
+        move : Move
+            What is in it.
+        points, commands : ndarray (parts, axes)
+            Where its parts end, as meant and as the controller is told.
+        share : ndarray (parts,)
+            The shares of the move that they end.
+        """
+        end = line[len(line.rstrip("\r\n")) :] or "\n"
+        self._require(move, len(points))
+        if move.fresh is not None:
+            known = list(move.fresh) if not self._machine.joints else []
+            self._last = known or [None] * len(self._last)
+        pieces = []
+        before, done, fed = move.start, 0.0, False
+        for k, (point, command, part) in enumerate(zip(points, commands, share, strict=True)):
+            last = list(self._last)
+            words = self._words(move, command, first=k == 0)
+            extra = self._extruded(line, move, done, part, len(points))
+            feed = self._feed(move, before, point, last)
+            fed = fed or feed != ""
+            pieces.append((words, extra, feed))
+            before, done = point, float(part)
+        text = _first(line.rstrip("\r\n"), move, *pieces[0]) + end
+        if move.begins_times:
+            mark = MARK if text.startswith(MARK) else ""
+            text = mark + "G93" + end + text[len(mark) :]
+        head = "G1" if move.straight else "G0"
+        for words, extra, feed in pieces[1:]:
+            named = [letter + value for letter, value in words.items()]
+            text += " ".join([head, *named, *filter(None, [extra, feed])]) + end
+        if fed and not self._machine.joints:
+            head = "" if self._program.dialect.block else "G1 "
+            text += f"{head}F{_figures(move.feed / move.scale)}" + end
+        return text if line.endswith(("\n", "\r")) else text[: -len(end)]
+
+    def _require(self, move: Move, parts: int) -> None:
+        """Refuse what cannot be written."""
+        odd = move.relative or move.scale != 1.0
+        if self._machine.joints and odd:
+            raise self._program.wrong(
+                move.line, "joint moves are made of absolute coordinates in mm"
+            )
+        if self._machine.joints and move.straight and (move.per_turn or move.feed <= 0.0):
+            raise self._program.wrong(
+                move.line, "a joint move needs the feed F of its G1, in mm a minute"
+            )
+        if self._machine.joints and move.straight and not move.known:
+            raise self._program.wrong(
+                move.line,
+                "where this move begins is not known, nor how long it takes as a joint move: state"
+                " the pose at the start, or make it a rapid move, G0",
+            )
+        if parts > 1 and move.behind:
+            raise self._program.wrong(
+                move.line,
+                f"{move.behind} acts behind a move that is made in parts: give it another line",
+            )
+
+    def _words(self, move: Move, command: FloatArray, first: bool) -> dict[str, str]:
+        """The words of a point: those that the line has, and those that change."""
+        words = {}
+        for k, letter in enumerate(self._machine.written):
+            scale = move.scale if letter in "XYZ" and not self._machine.joints else 1.0
+            value = round(float(command[k]) / scale, _DECIMALS)
+            last = self._last[k]
+            known = last is not None and abs(last / scale - value) < 0.5 * 10.0**-_DECIMALS
+            if known and not (first and letter in move.words and not self._machine.joints):
+                continue
+            if move.relative and not self._machine.joints:
+                shown = value - (0.0 if last is None else last / scale)
+                words[letter] = number(shown, _DECIMALS)
+                value = (0.0 if last is None else last / scale) + round(shown, _DECIMALS)
+            else:
+                words[letter] = number(value, _DECIMALS)
+            self._last[k] = value * scale
+        if not words:  # of a joint move that stays: no move is without
+            words[self._machine.written[0]] = number(float(command[0]), _DECIMALS)
+        return words
+
+    def _extruded(self, line: str, move: Move, done: float, part: float, count: int) -> str:
+        """The E word of a part."""
+        if move.extrusion is None:
+            return ""
+        word, before, relative = move.extrusion
+        if count == 1:
+            return f"E{line[word.start : word.end]}"
+        if relative is None:
+            raise self._program.wrong(
+                move.line,
+                "this move is made in parts, and whether E is relative is not certain: state M82 or"
+                " M83 behind the last G90 or G91",
+            )
+        if relative:
+            one, other = (number(word.value * each, _DECIMALS) for each in (part, done))
+            return f"E{number(float(one) - float(other), _DECIMALS)}"
+        if before is None:
+            raise self._program.wrong(
+                move.line,
+                "this move is made in parts, and where E is before it is not known: state G92 E0",
+            )
+        return f"E{number(before + (word.value - before) * part, _DECIMALS)}"
+
+    def _feed(
+        self, move: Move, before: FloatArray, point: FloatArray, last: list[float | None]
+    ) -> str:
+        """The F word of a part.
+
+        Of a joint move, the reciprocal of its minutes. Else none, unless the controller would take
+        another time: it takes F along X, Y and Z, and along angles where none of these moves.
+        """
+        joints = self._machine.joints
+        if not move.straight or (not joints and (self._lengths.all() or None in last)):
+            return ""
+        way = self._way(point - before)
+        if joints:
+            return f"F{_figures(move.feed / way)}" if way else "F1000000"
+        step = np.array(self._last, dtype=float) - np.array(last, dtype=float)
+        lengths = self._lengths
+        longer = self._way(step) / way if way else 1.0
+        if np.any(step[lengths]) != np.any((point - before)[lengths]):
+            longer *= 1.0 / move.scale if np.any(step[lengths]) else move.scale
+        if longer == 0.0 or abs(longer - 1.0) <= _SLOWER:
+            return ""
+        if move.feed <= 0.0:
+            raise self._program.wrong(move.line, "needs a feed F: corrected, its length changes")
+        return f"F{_figures(move.feed / move.scale * longer)}"
+
+    def _way(self, step: FloatArray) -> float:
+        """How long a step is to a feed: mm, or degrees if only angles change."""
+        return float(np.linalg.norm(step[self._lengths]) or np.linalg.norm(step[~self._lengths]))
+
+
+def _first(line: str, move: Move, words: dict[str, str], extra: str, feed: str) -> str:
+    """The line of the program with other numbers in it."""
+    edits = []
+    for letter, word in move.words.items():
+        if letter in words and abs(float(words[letter]) - word.value) < 0.5 * 10.0**-_DECIMALS:
+            continue  # as it was written
+        if letter in words:
+            edits.append((word.start, word.end, words[letter]))
+        else:  # joint moves have words of their own
+            edits.append((word.at, word.end, ""))
+    if move.extrusion is not None:
+        edits.append((move.extrusion.word.start, move.extrusion.word.end, extra[1:]))
+    if feed and move.feed_word is not None:
+        edits.append((move.feed_word.start, move.feed_word.end, feed[1:]))
+    added = [letter + value for letter, value in words.items() if letter not in move.words]
+    added += [feed] if feed and move.feed_word is None else []
+    end = max(word.end for word in move.words.values())
+    edits.append((end, end, "".join(" " + word for word in added)))
+    for start, end, new in sorted(edits, reverse=True):
+        line = line[:start] + new + line[end:]
+    return line
+
+
+def number(value: float, decimals: int) -> str:
+    """A number of G-code: no more decimals than it needs."""
+    text = f"{value:.{decimals}f}"
+    text = text.rstrip("0").rstrip(".") if "." in text else text
+    return "0" if text in ("-0", "") else text
+
+
+def _figures(value: float) -> str:
+    """A number of G-code, which knows no exponent, with as many figures as a feed needs."""
+    text = np.format_float_positional(
+        value, precision=_FIGURES, unique=False, fractional=False, trim="-"
+    )
+    return str(text)

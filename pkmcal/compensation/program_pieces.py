@@ -1,0 +1,103 @@
+"""A program that is corrected piece by piece, so that long ones need little memory."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import islice
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.compensation.chord_errors import ChordErrors, slices
+from pkmcal.compensation.commanded_machine import CommandedMachine
+from pkmcal.compensation.gcode import Move, Program
+from pkmcal.compensation.gcode_writer import Writer
+
+_LINES = 4096  # that are in memory
+_Lines = Sequence[tuple[str, Move | None]]
+
+
+class Pieces:
+    """The pieces of a corrected program, in turn, and what is known when all are out.
+
+    Attributes
+    ----------
+    moves, segments : int
+        Moves that were read, and written.
+    correction : float
+        The largest correction of a position, mm; of joint moves, NaN.
+    chord_error : float
+        The largest distance from a straight line that was found, mm.
+    """
+
+    def __init__(self, program: Program, machine: CommandedMachine, chord: float) -> None:
+        self.moves = self.segments = 0
+        self.correction = np.nan if machine.joints else 0.0
+        self.chord_error = 0.0
+        self._program, self._machine = program, machine
+        self._errors = ChordErrors(program, machine, chord)
+        self._writer = Writer(program, machine)
+        self._last: FloatArray | None = None  # the command before
+
+    def __iter__(self) -> Iterator[str]:
+        lines = self._program.read()
+        while some := list(islice(lines, _LINES)):
+            moves = [move for _, move in some if move is not None]
+            parts, chord_error = self._errors.parts(moves)
+            self.chord_error = max(self.chord_error, chord_error)
+            at = 0
+            for rows in slices(parts):
+                last = rows.stop == len(moves)
+                size = len(some) if last else _lines_of(some, at, rows.stop - rows.start)
+                yield self._piece(some[at:size], moves[rows], parts[rows])
+                at = size
+            if not moves:
+                yield "".join(line for line, _ in some)
+
+    def _piece(self, lines: _Lines, moves: Sequence[Move], parts: IntArray) -> str:
+        """Lines, their moves in so many parts."""
+        share = np.concatenate([np.arange(1, count + 1) / count for count in parts])
+        which = np.repeat(np.arange(len(moves)), parts)
+        starts = np.array([move.start for move in moves])
+        targets = np.array([move.target for move in moves])
+        points = starts[which] + share[:, None] * (targets - starts)[which]
+        points[np.cumsum(parts) - 1] = targets
+        commands = self._commands(moves, which, points)
+        self.moves, self.segments = self.moves + len(moves), self.segments + len(points)
+        self._compare(points, commands)
+        text, at = [], 0
+        counts = iter(parts.tolist())
+        for line, move in lines:
+            if move is not None:
+                rows = slice(at, at + next(counts))
+                at = rows.stop
+                line = self._writer.lines(line, move, points[rows], commands[rows], share[rows])
+            text.append(line)
+        return "".join(text)
+
+    def _commands(self, moves: Sequence[Move], which: IntArray, points: FloatArray) -> FloatArray:
+        """What to write for points, going on from the command before."""
+        commands = self._machine.command(points)
+        unreached = which[~np.isfinite(commands).all(axis=1)]
+        if len(unreached):
+            raise self._errors.unreached(moves[int(unreached[0])])
+        before = [] if self._last is None else [self._last]
+        commands = self._machine.continuous(np.vstack([*before, commands]))[len(before) :]
+        self._last = commands[-1]
+        return commands
+
+    def _compare(self, points: FloatArray, commands: FloatArray) -> None:
+        """Note the largest correction of a position."""
+        if self._machine.joints:
+            return
+        lengths = [k for k, letter in enumerate(self._machine.letters) if letter in "XYZ"]
+        off = np.linalg.norm((points - commands)[:, lengths], axis=1)
+        self.correction = max(self.correction, float(off.max()))
+
+
+def _lines_of(lines: _Lines, at: int, moves: int) -> int:
+    """Behind which line so many moves are complete."""
+    while moves:
+        moves -= lines[at][1] is not None
+        at += 1
+    return at
