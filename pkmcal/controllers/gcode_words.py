@@ -68,10 +68,13 @@ def off_towers(angles: Sequence[float]) -> dict[str, list[float]]:
     return each("XYZ", [(angle - tower + 180.0) % 360.0 - 180.0 for angle, tower in pairs])
 
 
-def settings(text: str, command: str, place: str, missing: bool = False) -> Settings:
+def settings(
+    text: str, command: str, place: str, missing: bool = False, kind: str = ""
+) -> Settings:
     """The words of a command: what was set last, in one of them or in several.
 
-    Another K starts anew: it is another kinematics. With `missing` there may be no such command.
+    Another K starts anew: it is another kinematics. With `kind` those of another K are passed over,
+    and those without K are of this one. With `missing` there may be no such command.
 
     Raises
     ------
@@ -92,6 +95,8 @@ def settings(text: str, command: str, place: str, missing: bool = False) -> Sett
         if _in_a_block(text, line):
             raise _wrong(line, place, f"{command} under a condition, which cannot be followed")
         new = _words_of(line, code[1], command, place)
+        if kind and "K" in new and new["K"].value != kind:
+            continue
         if "K" in new and new["K"].value != found.get("K", new["K"]).value:
             found = {}
         found |= new

@@ -22,6 +22,9 @@ from pkmcal.kinematics.robot import Robot, require_parallel
 
 _TOWERS = 3
 _POSES = 300
+_FREE = ("radius", "angle1", "angle2", "offset1", "offset2", "offset3")
+_RODS = ("rod1", "rod2", "rod3")
+_HELD_RODS = "; heights hardly determine the rods"
 
 
 @dataclass(frozen=True)
@@ -152,6 +155,8 @@ def text_of(
     name: str,
     head: str = "",
     bed: bool = False,
+    probe: Sequence[float] | None = None,
+    rods: bool = False,
 ) -> str:
     """A robot file with the firmware's numbers.
 
@@ -165,6 +170,10 @@ def text_of(
         The robot's name; lines of comment.
     bed : bool
         Whether the nozzle stays between the towers, over the bed and below the end stops.
+    probe : sequence of float, optional
+        Offset of the bed probe, mm.
+    rods : bool
+        Whether a calibration frees the rods: where distances across the bed were measured.
     """
     across, high = round(firmware.radius, 3), round(min(firmware.endstops), 3)
     box = {"x": [-across, across], "y": [-across, across], "z": [0.0, high]}
@@ -189,9 +198,10 @@ def text_of(
         name,
         head,
         {"map": "translation", "home": {"z": round(0.5 * max(firmware.endstops), 3)}},
-        ["radius", "angle1", "angle2", "offset1", "offset2", "offset3"],
+        [*_FREE, *_RODS] if rods else _FREE,
         limbs,
         parameters,
-        "# Heights do not determine which way x is, so angle3 stays, and hardly the rods.\n",
+        f"# Nothing determines which way x is, so angle3 stays{'' if rods else _HELD_RODS}.\n",
         box if bed and across > 0 and high > 0 else None,
+        probe,
     )

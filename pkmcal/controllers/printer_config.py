@@ -175,6 +175,10 @@ class PrinterConfig:
         """Whether there is such an option."""
         return (section, option) in self._options
 
+    def sections(self, option: str) -> list[str]:
+        """The sections that have such an option."""
+        return [section for section, name in self._options if name == option]
+
     def text(self, section: str, option: str, default: str | None = None, depth: int = 0) -> str:
         """What an option says, `depth` names away from the one that was asked for.
 

@@ -6,8 +6,13 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from pkmcal.files.toml_lines import Source
 from pkmcal.geometry import robot_file
+from pkmcal.geometry.probe_offset import probe_table
 from pkmcal.geometry.robot_file_writer import lines
 from pkmcal.kinematics.robot import Robot
+
+_PROBE_REMARK = """\
+# The firmware's bed probe: it touches beside the nozzle by x and y, which is then z above the bed.
+"""
 
 
 def text_of(
@@ -19,6 +24,7 @@ def text_of(
     parameters: Mapping[str, object] | None = None,
     remark: str = "",
     workspace: Mapping[str, object] | None = None,
+    probe: Sequence[float] | None = None,
 ) -> str:
     """The text of a robot file in mm and degrees.
 
@@ -32,11 +38,15 @@ def text_of(
         A line of comment on what is free.
     workspace : mapping, optional
         Ends of coordinates.
+    probe : sequence of float, optional
+        Offset of the firmware's bed probe, mm.
     """
     blocks = [head, lines({"name": name, "units": {"length": "mm", "angle": "deg"}})]
     blocks.append("[pose]\n" + lines(pose))
     if workspace:
         blocks.append("[workspace]\n" + lines(workspace))
+    if probe is not None:
+        blocks.append(_PROBE_REMARK + "[probe]\n" + lines(probe_table(probe)))
     if parameters:
         blocks.append("[parameters]\n" + lines(parameters))
     blocks.append(remark + "[calibration]\n" + lines({"free": free}))

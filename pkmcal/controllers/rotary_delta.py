@@ -7,6 +7,7 @@ whose joints stand on the z axis: only shoulder less effector counts, in radius 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -163,7 +164,13 @@ def as_robot(delta: RotaryDelta, home: float) -> Robot:
     return robot_files.robot_of(text, "the firmware's numbers")
 
 
-def text_of(delta: RotaryDelta, home: float, name: str, head: str = "") -> str:
+def text_of(
+    delta: RotaryDelta,
+    home: float,
+    name: str,
+    head: str = "",
+    probe: Sequence[float] | None = None,
+) -> str:
     """A robot file with these numbers.
 
     Parameters
@@ -174,6 +181,8 @@ def text_of(delta: RotaryDelta, home: float, name: str, head: str = "") -> str:
         Height of the home pose, mm.
     name, head : str
         The robot's name; lines of comment.
+    probe : sequence of float, optional
+        Offset of the bed probe, mm.
     """
     alike = len(set(delta.heights)) == 1
     parameters = {"radius": delta.radius} | ({"height": delta.heights[0]} if alike else {})
@@ -198,7 +207,7 @@ def text_of(delta: RotaryDelta, home: float, name: str, head: str = "") -> str:
         limb |= {"offset": float(np.degrees(delta.elbows[i])), "branch": 1}
         limb |= {"gain": delta.gains[i]}
         limbs.append(limb)
-    return robot_files.text_of(name, head, pose, free, limbs, parameters, remark)
+    return robot_files.text_of(name, head, pose, free, limbs, parameters, remark, probe=probe)
 
 
 def _point(x: float, y: float) -> list[float]:

@@ -21,12 +21,14 @@ SEPARATORS = ("\t", ";", ",", " ")  # the first of those that fit equally well
 _LOOKED_AT = 200  # lines
 _COMMENT = re.compile(r"\s*(?:#|//|%)+")
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:[.,][0-9]*)?|[.,][0-9]+)(?:[eE][+-]?[0-9]+)?")
-_TRIGGER = re.compile(  # Klipper until 2025 and Kalico; Marlin
+_TRIGGER = re.compile(  # Klipper until 2025 and Kalico
     r"probe at (-?[0-9.]+),(-?[0-9.]+) is z=(-?[0-9.]+)"
-    r"|Bed X: ?(-?[0-9.]+) Y: ?(-?[0-9.]+) Z: ?(-?[0-9.]+)"
 )
-_CONTACT = re.compile(  # Klipper since: not of the nozzle when it triggered, but of the bed
+# Klipper since, and Marlin (Probe::probe_at_point): not of the nozzle when the probe triggered, but
+# of the bed, with the offsets of the probe taken in.
+_CONTACT = re.compile(
     r"probe: at (-?[0-9.]+),(-?[0-9.]+) bed will contact at z=(-?[0-9.]+)"
+    r"|Bed X: ?(-?[0-9.]+) Y: ?(-?[0-9.]+) Z: ?(-?[0-9.]+)"
 )
 _REPORTS = ("probe at ", "Bed X:", "bed will contact at")  # what such lines hold
 _GAP = re.compile(r" {2,}")

@@ -154,6 +154,9 @@ class Model:
         a bed or a frame being in the way. Empty where the file states none.
     load : Load or None
         What acts on the platform, of a machine on cables whose file states it.
+    probe : ndarray (3,) or None
+        Offset of the bed probe of a printer's firmware, mm: it touches at the nozzle's x and y
+        plus the first two, and the nozzle is then the third above the bed. None: not stated.
     """
 
     name: str
@@ -171,6 +174,7 @@ class Model:
     chains: Chains | None = None
     workspace: Box = field(default_factory=dict)
     load: Load | None = None
+    probe: FloatArray | None = None
 
     def __post_init__(self) -> None:
         if self.load is not None:  # some of its numbers may be those of the geometry

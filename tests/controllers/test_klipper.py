@@ -102,7 +102,11 @@ def test_what_the_firmware_reads_is_what_is_imported(tmp_path: Path) -> None:
     assert printer.measurements is not None and printer.measurements.kind == "height"
     np.testing.assert_array_equal(printer.measurements.values, [1.25, -0.1])
     np.testing.assert_array_equal(printer.measurements.actuators[0], [1000.5, 2000.25, 3000.0])
-    assert printer.distances == 1 and "1 distances" in str(printer)
+    assert printer.distances is not None and printer.distances.kind == "between"
+    np.testing.assert_array_equal(printer.distances.actuators, [[1.0, 2.0, 3.0]])
+    np.testing.assert_array_equal(printer.distances.other, [[4.0, 5.0, 6.0]])
+    assert printer.distances.values.tolist() == [65.5]
+    assert "1 distance of a printed part" in str(printer) and "rod1" in printer.robot.model.free
 
 
 def test_imported_printer_goes_where_the_firmware_goes(tmp_path: Path) -> None:
