@@ -38,13 +38,13 @@ from pkmcal.controllers.gcode_words import (
 )
 from pkmcal.controllers.linear_delta import FirmwareDelta, of_robot
 from pkmcal.controllers.loss import Loss
+from pkmcal.controllers.reprap_files import own_config
 from pkmcal.controllers.rotary_delta import is_rotary_delta
 from pkmcal.controllers.rotary_delta import of_robot as rotary_of_robot
 from pkmcal.controllers.rotary_gcode import reprap_commands as rotary_commands
 from pkmcal.controllers.rotary_gcode import reprap_lines as rotary_lines
 from pkmcal.exceptions import ArgumentError, FileError
 from pkmcal.files.atomic import write_whole
-from pkmcal.files.text_lines import text_in
 from pkmcal.kinematics.robot import Robot
 
 
@@ -84,7 +84,7 @@ def reprap(
     """
     path, project = as_path("path", path), flag("project", project)
     place = str(as_path("config", "config.g" if config is None else config))
-    text = None if config is None else text_in(config, "surrogateescape")
+    text = None if config is None else own_config(config)
     shift = 0.0 if text is None else mean_adjustment(text, place)
     if is_rotary_delta(robot):
         turning, loss = rotary_of_robot(robot, project, one_height=False)
@@ -227,7 +227,13 @@ def marlin_probe(text: str, place: str) -> tuple[float, float, float]:
 
 
 def reprap_probe(text: str, place: str) -> tuple[float, float, float] | None:
-    """The offset of RepRapFirmware's bed probe K0; None where G31 does not set its height."""
+    """The offset of RepRapFirmware's bed probe K0; None where G31 does not set its height.
+
+    Raises
+    ------
+    ValueError
+        It is no plain number, or set under a condition.
+    """
     found = settings(text, "G31", place, missing=True, kind="0")
     if "Z" not in found:
         return None

@@ -38,6 +38,15 @@ class Setting(NamedTuple):
     end: int
 
 
+class Command(NamedTuple):
+    """A line: where it ends, its code, the words behind it, whether it is under a condition."""
+
+    end: int
+    code: str
+    words: str
+    conditional: bool
+
+
 Settings = dict[str, Setting]
 Commands = Mapping[str, Mapping[str, Sequence[float]]]  # numbers by command and letter
 
@@ -103,6 +112,20 @@ def settings(
     if not times and not missing:
         raise FileError(f"{place}: {command} is missing")
     return found
+
+
+def commanded(text: str, *codes: str) -> list[Command]:
+    """The lines with these commands."""
+    return [
+        Command(
+            line.end(),
+            code[0],
+            _without_remarks(line[0])[code[1] :].strip(),
+            _in_a_block(text, line),
+        )
+        for line, code in _codes(text)
+        if code[0] in codes
+    ]
 
 
 def in_inches(text: str) -> bool:

@@ -13,6 +13,7 @@ from pkmcal.arguments import word
 from pkmcal.controllers import hangprinter, linear_delta, maslow, rotary_delta, rotary_gcode
 from pkmcal.controllers.delta_gcode import marlin_probe, of_marlin, of_reprap, reprap_probe
 from pkmcal.controllers.klipper_import import of_klipper
+from pkmcal.controllers.reprap_files import Running, running
 from pkmcal.controllers.robot_files import robot_of
 from pkmcal.controllers.stored import Stored
 from pkmcal.exceptions import FileError
@@ -106,7 +107,8 @@ def import_printer(path: str | PathLike[str], firmware: Firmware = "klipper") ->
     path : str or path
         A printer.cfg of Klipper or Kalico: the block of SAVE_CONFIG at its end and included files
         that are there are read too. Or a file with the M665 and M666 of the other firmwares;
-        actuator coordinates are then mm down from the end stops. Marlin's M851 belongs to them:
+        actuator coordinates are then mm down from the end stops. What a config.g of RepRapFirmware
+        runs by M501 and M98 is read where it is. Marlin's M851 belongs to them:
         with a bed probe it homes by its Z. Or the M669 and M666 of a
         Hangprinter, or the maslow.yaml of a Maslow or the log of its calibration.
     firmware : {"klipper", "reprap", "marlin", "hangprinter", "maslow"}
@@ -137,15 +139,19 @@ def import_printer(path: str | PathLike[str], firmware: Firmware = "klipper") ->
     if firmware == "klipper":
         found = of_klipper(path)
     elif firmware == "hangprinter":
-        machine = hangprinter.of_text(text_in(path, "replace"), str(where))
+        started = running(path)
+        machine = hangprinter.of_text(started.text, str(where))
         head = (_ANCHORS_HEAD if machine.spools is None else _SPOOLS_HEAD).format(file=where.name)
-        found = Stored(hangprinter.robot_text(machine, where.stem, head), notes=machine.notes)
+        text = hangprinter.robot_text(machine, where.stem, head)
+        found = Stored(text, notes=(*started.notes, *machine.notes))
     elif firmware == "maslow":
         anchors, belts = maslow.of_text(text_in(path), str(where))
         text = maslow.robot_text(anchors, where.stem, _BELTS_HEAD.format(file=where.name))
         found = Stored(text, Measurements(belts, None, "closure") if len(belts) else None)
+    elif firmware == "marlin":
+        found = _of_marlin(where, text_in(path, "replace"))  # of comments
     else:
-        found = _of_gcode(where, text_in(path, "replace"), firmware)  # of comments
+        found = _of_reprap(where, running(path))
     try:
         robot = robot_of(found.text, "robot file")
     except FileError as error:  # each number is right, and what follows from them is not
@@ -154,17 +160,27 @@ def import_printer(path: str | PathLike[str], firmware: Firmware = "klipper") ->
     return Printer(robot, found.measurements, found.distances, found.text, found.notes)
 
 
-def _of_gcode(where: Path, text: str, firmware: str) -> Stored:
-    """What M665, M666 and their like say."""
-    place, head = str(where), _GCODE_HEAD.format(file=where.name)
-    if firmware == "marlin":
-        delta, touching = of_marlin(text, place), marlin_probe(text, place)
-        return Stored(linear_delta.text_of(delta, _DOWN, where.stem, head, True, touching))
-    probe = reprap_probe(text, place)
+def _of_marlin(where: Path, text: str) -> Stored:
+    """What M503 lists."""
+    delta, probe = of_marlin(text, str(where)), marlin_probe(text, str(where))
+    head = _GCODE_HEAD.format(file=where.name)
+    return Stored(linear_delta.text_of(delta, _DOWN, where.stem, head, True, probe))
+
+
+def _of_reprap(where: Path, started: Running) -> Stored:
+    """What a config.g and the files that it runs say of a linear or rotary delta."""
+    text, place, notes = started.text, str(where), started.notes
+    probe = None
+    try:
+        probe = reprap_probe(text, place)
+    except FileError as error:  # the geometry does not hang on it
+        notes = (*notes, f"{error}: the offset of the probe was not read")
     if rotary_gcode.is_rotary(text, place):
         crank = rotary_gcode.of_reprap(text, place)
         home, head = round(0.5 * max(crank.endstops), 3), _DEGREES_HEAD.format(file=where.name)
-        return Stored(rotary_delta.text_of(crank, home, where.stem, head, probe))
-    return Stored(
-        linear_delta.text_of(of_reprap(text, place), _DOWN, where.stem, head, True, probe)
-    )
+        robot = rotary_delta.text_of(crank, home, where.stem, head, probe)
+    else:
+        head = _GCODE_HEAD.format(file=where.name)
+        delta = of_reprap(text, place)
+        robot = linear_delta.text_of(delta, _DOWN, where.stem, head, True, probe)
+    return Stored(robot, notes=notes)

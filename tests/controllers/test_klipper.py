@@ -235,6 +235,59 @@ def test_a_saved_block_that_the_firmware_leaves_out_is_not_read(tmp_path: Path) 
         pk.import_printer(own(tmp_path, text))
 
 
+HEADER = "#*# <---------------------- SAVE_CONFIG ---------------------->"
+
+
+def klippers_own(text: str) -> str:
+    """The saved block as Klipper's _find_autosave_data() finds it; "" where it does not."""
+    header = f"\n{HEADER}\n#*# DO NOT EDIT THIS BLOCK OR BELOW. The contents are auto-generated.\n"
+    above, found, block = text.replace("\r\n", "\n").partition(header + "#*#\n")
+    if not found or "\n#*# " in above or header in block:
+        return ""
+    lines = block.strip().split("\n")
+    return block if all(line == "#*#" or line.startswith("#*# ") for line in lines) else ""
+
+
+@pytest.mark.parametrize("newline", ["\n", "\r\n"])
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("# mine", "# mine\n#*# old", "line 2: begins with '#\\*# ' above SAVE_CONFIG"),
+        ("# mine", "#*# mine", ""),  # the firmware looks behind line ends
+        ("# mine", "# mine\n#*#", ""),
+        ("# mine", "# mine\n #*# in", ""),
+        (
+            HEADER,
+            HEADER.replace("--- S", "-- S"),
+            "line 24: the three lines of SAVE_CONFIG's header",
+        ),
+        (HEADER, HEADER + " ", "line 24: the three lines of SAVE_CONFIG's header"),
+        ("auto-generated.", "auto-generated", "line 24: the three lines of SAVE_CONFIG's header"),
+        (
+            "generated.\n#*#\n",
+            "generated.\n#*# \n",
+            "line 24: the three lines of SAVE_CONFIG's header",
+        ),
+        ("generated.\n#*#\n", "generated.\n", "line 24: the three lines of SAVE_CONFIG's header"),
+        ("#*# [stepper_a]", HEADER + "\n#*# [stepper_a]", "line 30: behind SAVE_CONFIG"),
+        ("#*# [stepper_a]", "[stepper_a]", "line 30: behind SAVE_CONFIG"),
+    ],
+)
+def test_a_saved_block_counts_where_the_firmware_takes_it(
+    old: str, new: str, message: str, newline: str, tmp_path: Path
+) -> None:
+    text = OWN.replace(old, new, 1).replace("\n", newline)
+    assert text != OWN.replace("\n", newline)
+    (tmp_path / "mine.cfg").write_bytes(text.encode())
+    if message:
+        with pytest.raises(pk.FileError, match=message):
+            pk.import_printer(tmp_path / "mine.cfg")
+    else:
+        assert klippers_own(text) and pk.import_printer(tmp_path / "mine.cfg").measurements
+    if not new.startswith(HEADER + "\n"):  # that is no line of any section, and refused as such
+        assert bool(klippers_own(text)) is not bool(message)
+
+
 def test_comments_stay_and_a_gain_becomes_a_rotation_distance(tmp_path: Path) -> None:
     file = own(tmp_path)
     robot = pk.import_printer(file).robot
