@@ -25,7 +25,8 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray, TextArray, Unit
 from pkmcal.files.csv_table import Table
-from pkmcal.measurements.actuator_columns import actuators_in
+from pkmcal.kinematics.reading_units import Actuated
+from pkmcal.measurements.actuator_columns import actuators_in, read_second_actuators
 from pkmcal.measurements.components import (
     KINDS,
     TOUCHES,
@@ -126,10 +127,12 @@ def value_columns(table: Table, kind: Kind) -> Components:
     return tuple(pair for pair in of if kind != "touch" or pair[0] in table.columns)
 
 
-def read_kind_fields(table: Table, kind: Kind, units: Sequence[str]) -> dict[str, Any]:
+def read_kind_fields(
+    table: Table, kind: Kind, units: Sequence[str], robot: Actuated | None
+) -> dict[str, Any]:
     """The fields of `Measurements` that this kind alone has."""
     if kind == "between":
-        return {"other": table.stacked([f"to.q{i + 1}" for i in range(len(units))], units)}
+        return {"other": read_second_actuators(table, units, robot)}
     if kind == "relative-distance":
         return {"run": np.array(table.texts("run"))}
     if kind == "angle":

@@ -196,7 +196,7 @@ def read_measurements(
     kind = _kind(table, several)
     fields: dict[str, Any] = {"sigma": read_sigma(table, kind), "lines": np.array(table.lines)}
     fields["actuator_sigma"] = read_actuator_sigma(table, actuator_units)
-    fields |= read_kind_fields(table, kind, actuator_units)
+    fields |= read_kind_fields(table, kind, actuator_units, robot)
     if "group" in table.columns:
         fields["group"] = table.integers("group")
     fields["session"] = _read_session(table)

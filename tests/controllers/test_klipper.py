@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -385,22 +386,31 @@ def test_mistakes_are_named_with_their_line(
     assert message in str(caught.value)
 
 
+def stored(log: dict[str, Any], longer: float) -> str:
+    """A printer.cfg with what is measured in a log, and with numbers that are off."""
+    text = f"[printer]\nkinematics: delta\ndelta_radius: {log['radius'] + 1.5}\n"
+    for i, axis in enumerate("abc"):
+        text += f"[stepper_{axis}]\nrotation_distance: {log['stepdist'][i] * 3200!r}\n"
+        text += f"microsteps: 16\narm_length: {log['arm_length'][i] + longer * i}\n"
+        text += f"angle: {log['angle'][i] + 0.3 * (i - 2)}\n"
+        text += f"position_endstop: {log['position_endstop'][i] - 1 + i}\n"
+    text += "[delta_calibrate]\n"
+    for i, (height, pos) in enumerate(zip(log["height"], log["pos"], strict=True)):
+        text += f"height{i}: {height}\nheight{i}_pos: {','.join(map(str, pos))}\n"
+    for i, (distance, *ends) in enumerate(log.get("distance") or []):
+        text += f"distance{i}: {distance}\n"
+        for end, pos in enumerate(ends, 1):
+            text += f"distance{i}_pos{end}: {','.join(map(str, pos))}\n"
+    return text
+
+
 @pytest.mark.skipif(not LOGS.exists(), reason=f"{LOGS} is not here")
 def test_real_logs_lead_to_what_the_firmware_found(tmp_path: Path) -> None:
     """Four printers: from numbers that are off, the stored heights lead to the saved ones."""
     logs = [log for log in json.loads(LOGS.read_text()) if not log.get("distance")]
     assert logs
     for log in logs:
-        text = f"[printer]\nkinematics: delta\ndelta_radius: {log['radius'] + 1.5}\n"
-        for i, axis in enumerate("abc"):
-            text += f"[stepper_{axis}]\nrotation_distance: {log['stepdist'][i] * 3200!r}\n"
-            text += f"microsteps: 16\narm_length: {log['arm_length'][i]}\n"
-            text += f"angle: {log['angle'][i] + 0.3 * (i - 2)}\n"
-            text += f"position_endstop: {log['position_endstop'][i] - 1 + i}\n"
-        text += "[delta_calibrate]\n"
-        for i, (height, pos) in enumerate(zip(log["height"], log["pos"], strict=True)):
-            text += f"height{i}: {height}\nheight{i}_pos: {','.join(map(str, pos))}\n"
-        file = own(tmp_path, text)
+        file = own(tmp_path, stored(log, 0.0))
         printer = pk.import_printer(file)
         assert printer.measurements is not None
         found = pk.identify(printer.robot, printer.measurements)
@@ -416,6 +426,37 @@ def test_real_logs_lead_to_what_the_firmware_found(tmp_path: Path) -> None:
         endstops, saved = written("position_endstop"), np.array(log["position_endstop"])
         shift = endstops - saved  # of all three alike: the first layer, set by hand afterwards
         assert abs(shift).max() < 0.1
+        np.testing.assert_allclose(shift, shift.mean(), rtol=0, atol=1e-3)
+
+
+@pytest.mark.skipif(not LOGS.exists(), reason=f"{LOGS} is not here")
+def test_distances_of_a_print_lead_to_the_nine_numbers_the_firmware_found(
+    run: Any, tmp_path: Path
+) -> None:
+    """From rods and all that are off, through files in steps, with the firmware's own weights.
+
+    calculate_params() of Klipper's delta_calibrate.py weighs heights by 2 n_distances / n_heights.
+    """
+    logs = [log for log in json.loads(LOGS.read_text()) if log.get("distance")]
+    assert len(logs) == 2
+    for log in logs:
+        out = tmp_path / str(log["printer"]).replace(" ", "")
+        assert run("import", own(tmp_path, stored(log, 0.5)), "--out", out).exit_code == 0
+        robot = pk.load(out / "robot.toml")
+        assert {"rod1", "rod2", "rod3"} < set(robot.model.free)
+        heights = pk.read_measurements(out / "probe.csv", robot)
+        distances = pk.read_measurements(out / "distances.csv", robot)
+        assert (len(heights), len(distances), distances.kind) == (7, 12, "between")
+        weight = 2.0 * len(distances) / len(heights)
+        both = [replace(heights, sigma=0.2 / weight**0.5), replace(distances, sigma=0.2)]
+        g = pk.identify(robot, both).robot.geometry
+        np.testing.assert_allclose([g[f"rod{i}"] for i in (1, 2, 3)], log["arm_length"], atol=1e-3)
+        assert g["radius"] == pytest.approx(log["radius"], abs=1e-3)
+        angles = np.degrees([g[f"angle{i}"] for i in (1, 2, 3)])
+        np.testing.assert_allclose(angles, log["angle"], atol=1e-3)
+        carriages = [in_the_middle(g["radius"], g[f"rod{i}"], 0.0) for i in (1, 2, 3)]
+        shift = [g[f"offset{i}"] for i in (1, 2, 3)] - np.add(carriages, log["position_endstop"])
+        assert abs(shift).max() < 0.3  # of all three alike: the first layer, set by hand
         np.testing.assert_allclose(shift, shift.mean(), rtol=0, atol=1e-3)
 
 
