@@ -12,7 +12,7 @@ from pkmcal.arguments import word
 from pkmcal.cli.inputs import Inputs
 from pkmcal.cli.options import Force, Json
 from pkmcal.cli.output import Output, say
-from pkmcal.controllers.import_printer import Firmware
+from pkmcal.controllers.firmwares import Firmware
 from pkmcal.kinematics.reading_units import reading_units
 from pkmcal.measurements.measurement_writer import write_measurements
 from pkmcal.measurements.measurements import Measurements
@@ -28,17 +28,27 @@ def import_file(
         Path, typer.Option(metavar="DIR", help="Where to write; made if it is not there.")
     ] = Path("."),
     firmware: Annotated[
-        str,
-        typer.Option("--from", metavar="FIRMWARE", help=f"{', '.join(get_args(Firmware))}."),
-    ] = "klipper",
+        str | None,
+        typer.Option(
+            "--from",
+            metavar="FIRMWARE",
+            help=f"Whose file it is, where it does not show it: {', '.join(get_args(Firmware))}.",
+        ),
+    ] = None,
+    log: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="LOG", help="Of a Maslow: the log of its calibration, beside its maslow.yaml."
+        ),
+    ] = None,
     force: Force = False,
     json: Json = False,
 ) -> int:
     """Make a robot file and measurements out of a printer's configuration.
 
-    Of a linear or rotary delta with Klipper or Kalico, of a linear one with the M665 and M666 of
-    RepRapFirmware or Marlin, of a Hangprinter with M669 and M666, or of a Maslow with its
-    maslow.yaml or the log of its calibration.
+    Whose it is stands in it, or is said by --from. Of a linear or rotary delta with Klipper or
+    Kalico, of a linear one with the M665 and M666 of RepRapFirmware or Marlin, of a Hangprinter
+    with M669 and M666, or of a Maslow with its maslow.yaml, the log of its calibration, or both.
     robot.toml has the firmware's numbers and the offset of its bed probe; probe.csv the heights
     that a DELTA_CALIBRATE stored, distances.csv the distances of a DELTA_ANALYZE, if there are any;
     belts.csv the belts of a Maslow's log.
@@ -46,7 +56,9 @@ def import_file(
     Example: pkmcal import examples/linear-delta/printer.cfg
     """
     read = Inputs()
-    printer = pk.import_printer(read.file(file), word("--from", firmware, get_args(Firmware)))
+    whose = None if firmware is None else word("--from", firmware, get_args(Firmware))
+    belts = None if log is None else read.file(log)
+    printer = pk.import_printer(read.file(file), whose, log=belts)
     tables = _tables(printer)
     output = Output(out, ["robot.toml", *tables], read, force)
     with output.draft() as draft:

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import Literal, get_args
+from typing import get_args
 
 from pkmcal.arguments import path as as_path
 from pkmcal.arguments import word
 from pkmcal.controllers import hangprinter, linear_delta, maslow, rotary_delta, rotary_gcode
 from pkmcal.controllers.delta_gcode import marlin_probe, of_marlin, of_reprap, reprap_probe
+from pkmcal.controllers.firmwares import Firmware, firmware_of
 from pkmcal.controllers.klipper_import import of_klipper
-from pkmcal.controllers.reprap_files import Running, running
-from pkmcal.controllers.robot_files import robot_of
+from pkmcal.controllers.reprap_files import running
+from pkmcal.controllers.robot_files import About, robot_of
 from pkmcal.controllers.stored import Stored
-from pkmcal.exceptions import FileError
+from pkmcal.exceptions import ArgumentError, FileError
+from pkmcal.files.reading import Input
 from pkmcal.files.text_lines import text_in
+from pkmcal.geometry.controller import Controller
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.result import Result
@@ -47,7 +50,6 @@ _BELTS_HEAD = """\
 # An actuator coordinate is the length of a belt in the plane, from the anchor to the middle of the
 # sled, mm. The frame begins at the anchor bottom left; the one bottom right says where x points.
 """
-Firmware = Literal["klipper", "reprap", "marlin", "hangprinter", "maslow"]
 _KINDS = {  # of limbs: what the machine is, and what its firmware stores
     "PUS": ("linear delta", "heights"),
     "RUS": ("rotary delta", "heights"),
@@ -99,7 +101,12 @@ class Printer(Result):
         yield from self.notes
 
 
-def import_printer(path: str | PathLike[str], firmware: Firmware = "klipper") -> Printer:
+def import_printer(
+    path: str | PathLike[str],
+    firmware: Firmware | None = None,
+    *,
+    log: str | PathLike[str] | None = None,
+) -> Printer:
     r"""Read a linear or rotary delta from its firmware's configuration, with stored probe results.
 
     Parameters
@@ -111,8 +118,10 @@ def import_printer(path: str | PathLike[str], firmware: Firmware = "klipper") ->
         runs by M501 and M98 is read where it is. Marlin's M851 belongs to them:
         with a bed probe it homes by its Z. Or the M669 and M666 of a
         Hangprinter, or the maslow.yaml of a Maslow or the log of its calibration.
-    firmware : {"klipper", "reprap", "marlin", "hangprinter", "maslow"}
-        Whose file it is.
+    firmware : {"klipper", "reprap", "marlin", "hangprinter", "maslow"}, optional
+        Whose file it is; by default what stands in it tells.
+    log : str or path, optional
+        Of a Maslow: the log of its calibration, where `path` is its maslow.yaml.
 
     Raises
     ------
@@ -134,24 +143,14 @@ def import_printer(path: str | PathLike[str], firmware: Firmware = "klipper") ->
     ...     pk.import_printer(f"{folder}/printer.cfg")
     <Printer: printer: a linear delta, no stored heights>
     """
-    word("firmware", firmware, get_args(Firmware))
-    where = as_path("path", path)
-    if firmware == "klipper":
-        found = of_klipper(path)
-    elif firmware == "hangprinter":
-        started = running(path)
-        machine = hangprinter.of_text(started.text, str(where))
-        head = (_ANCHORS_HEAD if machine.spools is None else _SPOOLS_HEAD).format(file=where.name)
-        text = hangprinter.robot_text(machine, where.stem, head)
-        found = Stored(text, notes=(*started.notes, *machine.notes))
-    elif firmware == "maslow":
-        anchors, belts = maslow.of_text(text_in(path), str(where))
-        text = maslow.robot_text(anchors, where.stem, _BELTS_HEAD.format(file=where.name))
-        found = Stored(text, Measurements(belts, None, "closure") if len(belts) else None)
-    elif firmware == "marlin":
-        found = _of_marlin(where, text_in(path, "replace"))  # of comments
+    where, path = as_path("path", path), path if isinstance(path, Input) else Input(path)
+    if firmware is None:
+        firmware = firmware_of(text_in(path, "replace"), str(where))
     else:
-        found = _of_reprap(where, running(path))
+        word("firmware", firmware, get_args(Firmware))
+    if log is not None and firmware != "maslow":
+        raise ArgumentError(f"log: only a Maslow's is read, and {where} is of {firmware}")
+    found = _of_maslow(path, log) if firmware == "maslow" else _READERS[firmware](path)
     try:
         robot = robot_of(found.text, "robot file")
     except FileError as error:  # each number is right, and what follows from them is not
@@ -160,27 +159,70 @@ def import_printer(path: str | PathLike[str], firmware: Firmware = "klipper") ->
     return Printer(robot, found.measurements, found.distances, found.text, found.notes)
 
 
-def _of_marlin(where: Path, text: str) -> Stored:
+def _of_hangprinter(path: str | PathLike[str]) -> Stored:
+    """The anchors of M669, and the spools of M666."""
+    started, where = running(path), as_path("path", path)
+    machine = hangprinter.of_text(started.text, str(where))
+    head = _ANCHORS_HEAD if machine.spools is None else _SPOOLS_HEAD
+    about = _about(where, head, "hangprinter", where.name * (not started.hides))
+    text = hangprinter.robot_text(machine, about)
+    return Stored(text, notes=(*started.notes, *machine.notes))
+
+
+def _of_maslow(path: str | PathLike[str], log: str | PathLike[str] | None) -> Stored:
+    """The anchors of a maslow.yaml or a log, and the belts of the log."""
+    where = as_path("path", path)
+    text = text_in(path) + ("" if log is None else "\n" + text_in(log))
+    anchors, belts = maslow.of_text(text, str(where))
+    if log is not None and not len(belts):
+        raise FileError(f"{as_path('log', log)}: no belts of a Maslow's calibration, CLBM:[…]")
+    config = where.name * (where.suffix.lower() in (".yaml", ".yml"))
+    text = maslow.robot_text(anchors, _about(where, _BELTS_HEAD, "maslow", config))
+    return Stored(text, Measurements(belts, None, "closure") if len(belts) else None)
+
+
+def _of_marlin(path: str | PathLike[str]) -> Stored:
     """What M503 lists."""
+    where, text = as_path("path", path), text_in(path, "replace")  # of comments
     delta, probe = of_marlin(text, str(where)), marlin_probe(text, str(where))
-    head = _GCODE_HEAD.format(file=where.name)
-    return Stored(linear_delta.text_of(delta, _DOWN, where.stem, head, True, probe))
+    about = _about(where, _GCODE_HEAD, "marlin", probe=probe)
+    return Stored(linear_delta.text_of(delta, _DOWN, about, bed=True))
 
 
-def _of_reprap(where: Path, started: Running) -> Stored:
+def _of_reprap(path: str | PathLike[str]) -> Stored:
     """What a config.g and the files that it runs say of a linear or rotary delta."""
-    text, place, notes = started.text, str(where), started.notes
-    probe = None
+    started, where = running(path), as_path("path", path)
+    text, place, notes, probe = started.text, str(where), started.notes, None
     try:
         probe = reprap_probe(text, place)
     except FileError as error:  # the geometry does not hang on it
         notes = (*notes, f"{error}: the offset of the probe was not read")
+    config = where.name * (not started.hides)
     if rotary_gcode.is_rotary(text, place):
         crank = rotary_gcode.of_reprap(text, place)
-        home, head = round(0.5 * max(crank.endstops), 3), _DEGREES_HEAD.format(file=where.name)
-        robot = rotary_delta.text_of(crank, home, where.stem, head, probe)
+        about = _about(where, _DEGREES_HEAD, "reprap", config, probe)
+        robot = rotary_delta.text_of(crank, round(0.5 * max(crank.endstops), 3), about)
     else:
-        head = _GCODE_HEAD.format(file=where.name)
-        delta = of_reprap(text, place)
-        robot = linear_delta.text_of(delta, _DOWN, where.stem, head, True, probe)
+        about = _about(where, _GCODE_HEAD, "reprap", config, probe)
+        robot = linear_delta.text_of(of_reprap(text, place), _DOWN, about, bed=True)
     return Stored(robot, notes=notes)
+
+
+def _about(
+    where: Path,
+    head: str,
+    firmware: Firmware,
+    config: str = "",
+    probe: tuple[float, float, float] | None = None,
+) -> About:
+    """What a robot file says of the file it was made of."""
+    controller = Controller(firmware, config)
+    return About(where.stem, head.format(file=where.name), probe, controller)
+
+
+_READERS: dict[str, Callable[[str | PathLike[str]], Stored]] = {
+    "klipper": of_klipper,
+    "reprap": _of_reprap,
+    "marlin": _of_marlin,
+    "hangprinter": _of_hangprinter,
+}

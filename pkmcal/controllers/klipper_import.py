@@ -18,8 +18,10 @@ from pkmcal.controllers.printer_config import (
     read,
     step_of,
 )
+from pkmcal.controllers.robot_files import About
 from pkmcal.controllers.rotary_delta import RotaryDelta, elbow_at
 from pkmcal.controllers.stored import Stored
+from pkmcal.geometry.controller import Controller
 from pkmcal.measurements.measurements import Measurements
 
 _LINEAR_HEAD = """\
@@ -52,17 +54,18 @@ def of_klipper(path: str | PathLike[str]) -> Stored:
     printer = read(path)
     absent = tuple(f"{file}, included, is not there and was not read" for file in printer.absent)
     where, probe = Path(printer.place), _probe(printer)
+    controller = Controller("klipper", where.name)
     heights, distances = _heights(printer), _distances(printer)
     if kinematics(printer) == "rotary_delta":
         crank = _rotary(printer)
         home = round(0.5 * max(crank.endstops), 3)
-        head = _ROTARY_HEAD.format(file=where.name)
-        text = rotary_delta.text_of(crank, home, where.stem, head, probe)
+        about = About(where.stem, _ROTARY_HEAD.format(file=where.name), probe, controller)
+        text = rotary_delta.text_of(crank, home, about)
     else:
         delta, steps = _linear(printer)
-        head = _LINEAR_HEAD.format(file=where.name)
+        about = About(where.stem, _LINEAR_HEAD.format(file=where.name), probe, controller)
         rods = heights is not None and distances is not None
-        text = linear_delta.text_of(delta, steps, where.stem, head, True, probe, rods)
+        text = linear_delta.text_of(delta, steps, about, bed=True, rods=rods)
     return Stored(text, heights, distances, absent)
 
 

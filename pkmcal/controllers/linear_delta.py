@@ -16,6 +16,7 @@ from pkmcal.arrays import FloatArray
 from pkmcal.controllers import robot_files
 from pkmcal.controllers.laws import require_plain_limbs
 from pkmcal.controllers.loss import Loss, cylinder, fitted, require_held
+from pkmcal.controllers.robot_files import About
 from pkmcal.core.library import SLOTS
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.robot import Robot, require_parallel
@@ -145,17 +146,15 @@ def _with_numbers(x: FloatArray) -> FirmwareDelta:
 
 def as_robot(firmware: FirmwareDelta, gains: Sequence[float]) -> Robot:
     """The robot with the firmware's numbers."""
-    text = text_of(firmware, gains, "linear delta")
+    text = text_of(firmware, gains, About("linear delta"))
     return robot_files.robot_of(text, "the firmware's numbers")
 
 
 def text_of(
     firmware: FirmwareDelta,
     gains: Sequence[float],
-    name: str,
-    head: str = "",
+    about: About,
     bed: bool = False,
-    probe: Sequence[float] | None = None,
     rods: bool = False,
 ) -> str:
     """A robot file with the firmware's numbers.
@@ -166,12 +165,10 @@ def text_of(
         The numbers.
     gains : sequence of float
         Mm a carriage rises for a unit of its actuator, which is 0 at the end stop.
-    name, head : str
-        The robot's name; lines of comment.
+    about : About
+        Its name and where it comes from.
     bed : bool
         Whether the nozzle stays between the towers, over the bed and below the end stops.
-    probe : sequence of float, optional
-        Offset of the bed probe, mm.
     rods : bool
         Whether a calibration frees the rods: where distances across the bed were measured.
     """
@@ -195,13 +192,11 @@ def text_of(
         )
     ]
     return robot_files.text_of(
-        name,
-        head,
+        about,
         {"map": "translation", "home": {"z": round(0.5 * max(firmware.endstops), 3)}},
         [*_FREE, *_RODS] if rods else _FREE,
         limbs,
         parameters,
         f"# Nothing determines which way x is, so angle3 stays{'' if rods else _HELD_RODS}.\n",
         box if bed and across > 0 and high > 0 else None,
-        probe,
     )

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
 from pkmcal.files.toml_lines import Source
 from pkmcal.geometry import robot_file
+from pkmcal.geometry.controller import Controller, controller_table
 from pkmcal.geometry.probe_offset import probe_table
 from pkmcal.geometry.robot_file_writer import lines
 from pkmcal.kinematics.robot import Robot
@@ -15,38 +17,59 @@ _PROBE_REMARK = """\
 """
 
 
+@dataclass(frozen=True)
+class About:
+    """What a robot file says beside the machine.
+
+    Attributes
+    ----------
+    name : str
+        The robot's name.
+    head : str
+        Lines of comment.
+    probe : sequence of float or None
+        Offset of the firmware's bed probe, mm.
+    controller : Controller or None
+        The firmware.
+    """
+
+    name: str
+    head: str = ""
+    probe: Sequence[float] | None = None
+    controller: Controller | None = None
+
+
 def text_of(
-    name: str,
-    head: str,
+    about: About,
     pose: Mapping[str, object],
     free: Sequence[str],
     limbs: Iterable[Mapping[str, object]],
     parameters: Mapping[str, object] | None = None,
     remark: str = "",
     workspace: Mapping[str, object] | None = None,
-    probe: Sequence[float] | None = None,
 ) -> str:
     """The text of a robot file in mm and degrees.
 
     Parameters
     ----------
-    name, head : str
-        The robot's name; lines of comment.
+    about : About
+        Its name and where it comes from.
     pose, free, limbs, parameters
         What the file's keys of these names say.
     remark : str
         A line of comment on what is free.
     workspace : mapping, optional
         Ends of coordinates.
-    probe : sequence of float, optional
-        Offset of the firmware's bed probe, mm.
     """
-    blocks = [head, lines({"name": name, "units": {"length": "mm", "angle": "deg"}})]
+    top = {"name": about.name, "units": {"length": "mm", "angle": "deg"}}
+    blocks = [about.head, lines(top)]
     blocks.append("[pose]\n" + lines(pose))
     if workspace:
         blocks.append("[workspace]\n" + lines(workspace))
-    if probe is not None:
-        blocks.append(_PROBE_REMARK + "[probe]\n" + lines(probe_table(probe)))
+    if about.controller is not None:
+        blocks.append("[controller]\n" + lines(controller_table(about.controller)))
+    if about.probe is not None:
+        blocks.append(_PROBE_REMARK + "[probe]\n" + lines(probe_table(about.probe)))
     if parameters:
         blocks.append("[parameters]\n" + lines(parameters))
     blocks.append(remark + "[calibration]\n" + lines({"free": free}))

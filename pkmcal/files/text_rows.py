@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from pkmcal.exceptions import FileError
+from pkmcal.files.height_map import bed_points, is_height_map
 from pkmcal.files.text_lines import lines_of
 
 SEPARATORS = ("\t", ";", ",", " ")  # the first of those that fit equally well
@@ -74,6 +75,11 @@ def text_rows(path: Path, content: bytes) -> TextRows:
             found.comments.append((number, line[match.end() :].strip()))
         else:
             lines.append((number, line.rstrip("\n")))
+    if is_height_map(text):
+        points = bed_points(path, lines)
+        found.rows = [(lines[0][0], ["x [mm]", "y [mm]", "contact [mm]"]), *points]
+        found.notes.append(f"a height map with {len(points)} points that were probed")
+        return found
     if any(words in text for words in _REPORTS):
         reports = {
             what: [(n, m) for n, line in enumerate(lines_of(text), 1) if (m := form.search(line))]

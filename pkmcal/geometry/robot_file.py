@@ -21,6 +21,7 @@ from pkmcal.files.atomic import write_whole
 from pkmcal.files.toml_lines import Source
 from pkmcal.files.toml_table import ANGLE_UNITS, LENGTH_UNITS, Table, Units, shown
 from pkmcal.geometry.box import read_box
+from pkmcal.geometry.controller import read_controller
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.load import Load, read_load
@@ -37,7 +38,7 @@ STATED_SIZES = ("base_radius", "base_diameter", "platform_radius", "platform_dia
 INDEPENDENT = "independent"  # the default free set of a file that names none: found when loaded
 TOP = (
     "name", "units", "closure_tolerance", "frames", "pose", "workspace", "load", "probe",
-    "parameters", "calibration", "stated", "limb", "tail",
+    "controller", "parameters", "calibration", "stated", "limb", "tail",
 )  # fmt: skip
 
 
@@ -183,6 +184,7 @@ def parse(source: Source, file: str | None) -> Model:
         workspace=read_box(_section(top, "workspace")),
         load=load,
         probe=read_probe(top.table("probe")) if "probe" in top else None,
+        controller=read_controller(top.table("controller")) if "controller" in top else None,
         file=file,
     )
     refuse_turning(model, described)

@@ -7,6 +7,7 @@ from typing import Any
 
 from pkmcal.arrays import FloatArray
 from pkmcal.core.library import AXES, MAPS, POSE
+from pkmcal.geometry.controller import controller_table
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.load import is_of_load, load_table
@@ -74,6 +75,7 @@ def _sections(model: Model) -> dict[str, Mapping[str, Any]]:
         "workspace": {name: list(ends) for name, ends in model.workspace.items()},
         "load": {} if model.load is None else load_table(model.load),
         "probe": {} if model.probe is None else probe_table(model.probe),
+        "controller": {} if model.controller is None else controller_table(model.controller),
         "parameters": {
             name: geometry[name] for name in geometry.parameters if not is_of_load(name)
         },
