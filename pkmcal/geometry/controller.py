@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from shlex import quote
 
 from pkmcal.files.toml_table import Table
 
@@ -27,9 +28,9 @@ class Controller:
 
     def command(self, robot: str) -> str:
         """What writes a robot file for it, on the command line."""
-        config = f" --config {self.file}" if self.file else ""
+        config = f" --config {quote(self.file)}" if self.file else ""
         suffix = Path(self.file).suffix or ".g"
-        return f"pkmcal export {robot} --as {self.firmware}{config} --out new{suffix}"
+        return f"pkmcal export {quote(robot)} --as {self.firmware}{config} --out new{suffix}"
 
 
 def read_controller(table: Table) -> Controller:

@@ -66,7 +66,7 @@ class Delta:
 
 def triggers(true: Delta, firmware: Delta, offset: Floats) -> Floats:
     """The nozzle's x, y, z as the firmware has them when its probe touches the flat bed."""
-    found = np.pad(GRID, ((0, 0), (0, 1)))
+    found = np.pad(GRID - offset[:2], ((0, 0), (0, 1)))
     for _ in range(30):  # the true height follows that of the firmware nearly one to one
         found[:, 2] += offset[2] - true.nozzle(firmware.gone(found))[:, 2]
     return found
@@ -136,15 +136,29 @@ def of_reprap(text: str) -> Delta:
     return Delta(float(size["R"]), angles, float(size["L"].split(":")[0]), ats)
 
 
-# Of each firmware: its file of a delta, a delta of its file, and a line of its log.
-FIRMWARES: dict[str, tuple[Callable[[Delta, Floats], str], Callable[[str], Delta], str]] = {
-    "klipper": (klipper_file, of_klipper, "// probe at {0:.6f},{1:.6f} is z={2:.6f}"),
-    "marlin": (marlin_file, of_marlin, "Bed X: {3:.6f} Y: {4:.6f} Z: {5:.6f}"),
-    "reprap": (
-        reprap_file,
-        of_reprap,
-        "// probe: at {3:.6f},{4:.6f} bed will contact at z={5:.6f}",
-    ),
+def height_map(touched: Floats, beds: Floats) -> str:
+    """heightmap.csv of RepRapFirmware: a bare 0 where nothing was probed."""
+    head = "RepRapFirmware height map file v2 generated at 2026-01-05 18:03, mean error 0.1\n"
+    head += "axis0,axis1,min0,max0,min1,max1,radius,spacing0,spacing1,num0,num1\n"
+    head += "X,Y,-80.00,80.00,-80.00,80.00,-1.00,40.00,40.00,5,5\n"
+    at = {(round(x), round(y)): f"{z:.6f}" for x, y, z in beds}
+    ends = range(-80, 81, 40)
+    return head + "".join(",".join(at.get((x, y), "0") for x in ends) + "\n" for y in ends)
+
+
+def lines_of(line: str) -> Callable[[Floats, Floats], str]:
+    """A log of lines with the nozzle's place, or with that of the bed."""
+    return lambda touched, beds: "\n".join(
+        line.format(*a, *b) for a, b in zip(touched, beds, strict=True)
+    )
+
+
+# Of each firmware: its file of a delta, a delta of its file, and its log.
+Log = Callable[[Floats, Floats], str]
+FIRMWARES: dict[str, tuple[Callable[[Delta, Floats], str], Callable[[str], Delta], Log]] = {
+    "klipper": (klipper_file, of_klipper, lines_of("// probe at {0:.6f},{1:.6f} is z={2:.6f}")),
+    "marlin": (marlin_file, of_marlin, lines_of("Bed X: {3:.6f} Y: {4:.6f} Z: {5:.6f}")),
+    "reprap": (reprap_file, of_reprap, height_map),
 }
 
 
@@ -167,19 +181,20 @@ def test_the_nozzle_is_at_its_height_after_a_calibration(
         angles=before.angles + np.append(rng.uniform(-0.3, 0.3, 2), 0.0),
         ends=before.ends + rng.uniform(-1.0, 1.0, 3),
     )
-    write, parse, line = FIRMWARES[firmware]
+    write, parse, said = FIRMWARES[firmware]
     file, log = tmp_path / "own.cfg", tmp_path / "log.txt"
     file.write_text(write(before, offset))
     touched = triggers(true, before, offset)
     beds = touched + offset * [1, 1, -1]
-    log.write_text("\n".join(line.format(*a, *b) for a, b in zip(touched, beds, strict=True)))
+    log.write_text(said(touched, beds))
 
-    printer = pk.import_printer(file, firmware)
+    printer = pk.import_printer(file)
     assert printer.robot.model.probe == pytest.approx(offset)
     printer.robot.save(tmp_path / "robot.toml")
     robot = pk.load(tmp_path / "robot.toml")
     found = pk.identify(robot, pk.read_measurements(log, robot)).robot
     assert isinstance(found, pk.Robot)
+    assert found.model.controller is not None and found.model.controller.firmware == firmware
     getattr(pk.export, firmware)(found, tmp_path / "new")
     after = parse((tmp_path / "new").read_text())
     commanded = np.column_stack([GRID, np.full(len(GRID), 0.2)])
