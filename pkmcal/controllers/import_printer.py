@@ -115,9 +115,9 @@ def import_printer(
         A printer.cfg of Klipper or Kalico: the block of SAVE_CONFIG at its end and included files
         that are there are read too. Or a file with the M665 and M666 of the other firmwares;
         actuator coordinates are then mm down from the end stops. What a config.g of RepRapFirmware
-        runs by M501 and M98 is read where it is. Marlin's M851 belongs to them:
-        with a bed probe it homes by its Z. Or the M669 and M666 of a
-        Hangprinter, or the maslow.yaml of a Maslow or the log of its calibration.
+        runs by M501 and M98 is read where it is. Marlin's M851 belongs to them: with a bed probe it
+        homes by its Z. Or the M669 and M666 of a Hangprinter, or the maslow.yaml of a Maslow or the
+        log of its calibration.
     firmware : {"klipper", "reprap", "marlin", "hangprinter", "maslow"}, optional
         Whose file it is; by default what stands in it tells.
     log : str or path, optional
@@ -150,7 +150,7 @@ def import_printer(
         word("firmware", firmware, get_args(Firmware))
     if log is not None and firmware != "maslow":
         raise ArgumentError(f"log: only a Maslow's is read, and {where} is of {firmware}")
-    found = _of_maslow(path, log) if firmware == "maslow" else _READERS[firmware](path)
+    found = _READERS[firmware](path) if log is None else _of_maslow(path, log)
     try:
         robot = robot_of(found.text, "robot file")
     except FileError as error:  # each number is right, and what follows from them is not
@@ -169,7 +169,7 @@ def _of_hangprinter(path: str | PathLike[str]) -> Stored:
     return Stored(text, notes=(*started.notes, *machine.notes))
 
 
-def _of_maslow(path: str | PathLike[str], log: str | PathLike[str] | None) -> Stored:
+def _of_maslow(path: str | PathLike[str], log: str | PathLike[str] | None = None) -> Stored:
     """The anchors of a maslow.yaml or a log, and the belts of the log."""
     where = as_path("path", path)
     text = text_in(path) + ("" if log is None else "\n" + text_in(log))
@@ -220,9 +220,10 @@ def _about(
     return About(where.stem, head.format(file=where.name), probe, controller)
 
 
-_READERS: dict[str, Callable[[str | PathLike[str]], Stored]] = {
+_READERS: dict[Firmware, Callable[[str | PathLike[str]], Stored]] = {
     "klipper": of_klipper,
     "reprap": _of_reprap,
     "marlin": _of_marlin,
     "hangprinter": _of_hangprinter,
+    "maslow": _of_maslow,
 }

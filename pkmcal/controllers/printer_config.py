@@ -277,8 +277,8 @@ class PrinterConfig:
                     raise self.wrong(
                         section,
                         option,
-                        f"would be {new}, in an included file, which is not changed; without"
-                        " config the lines alone are written",
+                        f"would be {new}, in an included file, which is not changed: give that"
+                        " file as config (--config), or none, which writes the lines alone",
                     )
                 line = text[place.line]
                 text[place.line] = line[: place.start] + new + line[place.end :]
