@@ -13,7 +13,14 @@ from numpy.typing import ArrayLike
 
 from pkmcal import screw
 from pkmcal.arms import arm_file
-from pkmcal.arms.denavit_hartenberg import Convention, DHTable, normals, screws_of, table_of
+from pkmcal.arms.denavit_hartenberg import (
+    Convention,
+    DHTable,
+    Parallel,
+    normals,
+    screws_of,
+    table_of,
+)
 from pkmcal.arms.inputs import motion
 from pkmcal.arms.serial_chain import SerialChain
 from pkmcal.arrays import FloatArray
@@ -199,7 +206,7 @@ class SerialArm(SerialChain, Result):
         """The motions E by its joint errors, in the base (eq. 10 and 18), (n, 4, 4)."""
         return screw.at_points(self._errors, self._points)
 
-    def dh(self, convention: Convention = "standard") -> DHTable:
+    def dh(self, convention: Convention = "standard", parallel: Parallel = "normal") -> DHTable:
         """Denavit–Hartenberg numbers of the arm, its joint errors built in.
 
         Any arm has them, between a base and a tool. Where neighbouring axes are nearly parallel,
@@ -210,11 +217,15 @@ class SerialArm(SerialChain, Result):
         ----------
         convention : {"standard", "modified"}
             As in `from_dh`.
+        parallel : {"normal", "hayati"}
+            How axes are written that are nearly parallel: by their common normal, or as parallel
+            ones with Hayati's parameter, a turn `beta` about y behind Tx(a) Rx(α).
 
         Returns
         -------
         DHTable
-            .a .alpha .d .theta (n,), mm and rad, and .base and .tool (4, 4).
+            .a .alpha .d .theta (n,), mm and rad, and .base and .tool (4, 4); .beta (n,) where it
+            was asked for.
 
         Examples
         --------
@@ -225,7 +236,8 @@ class SerialArm(SerialChain, Result):
         """
         nominal = table_of(self._axes, self._points, self._home, "standard")
         real = self.corrected()
-        return table_of(real.axes, real.points, real.home, convention, normals(nominal))
+        sides = normals(nominal)
+        return table_of(real.axes, real.points, real.home, convention, sides, parallel)
 
     def show(
         self, path: str | PathLike[str] | None = None, *, poses: ArrayLike | None = None

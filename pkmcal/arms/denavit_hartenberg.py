@@ -14,6 +14,8 @@ from pkmcal.arrays import FloatArray, as_numbers
 from pkmcal.exceptions import ArgumentError
 
 Convention = Literal["standard", "modified"]
+Parallel = Literal["normal", "hayati"]
+_NEARLY = 0.01  # sine of the angle up to which Hayati's parameter stands for a far common normal
 _PARALLEL = 1e-10  # sine of the angle between axes of which the common normal is anyone's
 _SAME = 1e-9  # mm, and of unit vectors
 
@@ -66,6 +68,9 @@ class DHTable:
     convention : {"standard", "modified"}
     base, tool : ndarray (4, 4)
         The first frame in the base, and the tool in the last frame, mm.
+    beta : ndarray (n,) or None
+        Hayati's parameter of axes that are nearly parallel, rad: behind Tx(a) Rx(α) comes Ry(β).
+        None where none are written with it.
     """
 
     a: FloatArray
@@ -75,6 +80,7 @@ class DHTable:
     convention: Convention
     base: FloatArray
     tool: FloatArray
+    beta: FloatArray | None = None
 
 
 def table_of(
@@ -83,39 +89,50 @@ def table_of(
     home: FloatArray,
     convention: Convention,
     sides: FloatArray | None = None,
+    parallel: Parallel = "normal",
 ) -> DHTable:
     """The numbers of an arm: the inverse of `screws_of`, for any axes.
 
     Of each pair of neighbouring axes the common normal is x, on the side of `sides` (n, 3), without
     them where x was before; of parallel ones that through the frame before, or at last through the
-    tool. Axes that are nearly parallel have it far away: a and d are then large and cancel. The
-    tool's z counts as an axis.
+    tool. Axes that are nearly parallel have it far away: a and d are then large and cancel; with
+    `parallel` "hayati" they are taken as parallel ones, and a turn β about y leads to the next axis
+    (S. A. Hayati, 22nd IEEE Conference on Decision and Control, 1983, p. 1477). The tool's z counts
+    as an axis.
     """
     word("convention", convention, get_args(Convention))
+    word("parallel", parallel, get_args(Parallel))
+    limit = _NEARLY if parallel == "hayati" else _PARALLEL
     z = np.vstack([axes, home[:3, 2]])
     on = np.vstack([points, home[:3, 3]])
     x = _across(z[0], np.eye(3)[0])
     origin = on[0] - z[0] * (on[0] @ z[0])  # the point of axis 1 next to the base's origin
     base = _frame(x, z[0], origin)
-    rows = np.empty((len(axes), 4))
+    rows = np.zeros((len(axes), 5))
     for i in range(len(axes)):
         near = on[-1] if i + 1 == len(axes) else origin  # where the normal of parallel axes is
         side = x if sides is None else sides[i]
-        normal, foot, end = _normal(z[i], on[i], z[i + 1], on[i + 1], side, near)
+        normal, foot, end = _normal(z[i], on[i], z[i + 1], on[i + 1], side, near, limit)
         rows[i, 3] = np.arctan2(z[i] @ np.cross(x, normal), x @ normal)  # θ
         rows[i, 2] = (foot - origin) @ z[i]  # d
         rows[i, 0] = (end - foot) @ normal  # a
         rows[i, 1] = np.arctan2(normal @ np.cross(z[i], z[i + 1]), z[i] @ z[i + 1])  # α
         x, origin = normal, end
-    a, alpha, d, theta = rows.T.copy()
+        if abs(lean := normal @ z[i + 1]) > _PARALLEL:  # only nearly parallel axes leave one
+            rows[i, 4] = np.arcsin(lean)  # β
+            x = _across(z[i + 1], normal)
+    a, alpha, d, theta, beta = rows.T.copy()
     tool = np.linalg.inv(_frame(x, z[-1], origin)) @ home
     if convention == "modified":
-        along = np.zeros((6,))
-        along[0], along[3] = alpha[-1], a[-1]
-        tool = screw.exp(along) @ tool
-        a, alpha = np.roll(a, 1), np.roll(alpha, 1)
-        a[0] = alpha[0] = 0.0
-    return DHTable(a, alpha, d, theta, convention, base, tool)
+        along = np.zeros((2, 6))
+        along[0, 0], along[0, 3], along[1, 1] = alpha[-1], a[-1], beta[-1]
+        turned = screw.exp(along)
+        tool = turned[0] @ turned[1] @ tool
+        a, alpha, beta = np.roll(a, 1), np.roll(alpha, 1), np.roll(beta, 1)
+        a[0] = alpha[0] = beta[0] = 0.0
+    return DHTable(
+        a, alpha, d, theta, convention, base, tool, beta if parallel == "hayati" else None
+    )
 
 
 def normals(table: DHTable) -> FloatArray:
@@ -136,13 +153,17 @@ def _normal(
     beyond: FloatArray,
     side: FloatArray,
     origin: FloatArray,
+    limit: float,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Common normal of two axes, and where it leaves the one and meets the other."""
+    """Common normal of two axes, and where it leaves the one and meets the other.
+
+    Of axes whose sine is below `limit`, the normal of the first one at the height of `origin`.
+    """
     cross = np.cross(z, other)
     sine = np.linalg.norm(cross)
-    if sine < _PARALLEL:
+    if sine < limit:
         foot = on + z * ((origin - on) @ z)
-        end = beyond + other * ((foot - beyond) @ other)
+        end = beyond + other * (((foot - beyond) @ z) / (other @ z))
         apart = end - foot
         far = np.linalg.norm(apart)
         normal = apart / far if far > _SAME else _across(z, side)

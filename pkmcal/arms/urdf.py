@@ -117,9 +117,16 @@ def _chain(
             raise FileError(f"{path}: joint {joint.name!r}: origin must be finite")
         if joint.type == "fixed":
             continue
-        if joint.type not in _KINDS or joint.mimics:
-            what = "mimic" if joint.mimics else joint.type
-            raise FileError(f"{path}: joint {joint.name!r} is {what}, which a serial arm has not")
+        if joint.follows:
+            raise FileError(
+                f"{path}: joint {joint.name!r} follows {joint.follows} (mimic), and each joint of a"
+                " serial arm has an actuator: without its <mimic> it is one, whose column of the"
+                " measurements states where it then is"
+            )
+        if joint.type not in _KINDS:
+            raise FileError(
+                f"{path}: joint {joint.name!r} is {joint.type}, which a serial arm has not"
+            )
         if not any(joint.axis):
             raise FileError(f"{path}: joint {joint.name!r}: axis must be a direction, found 0 0 0")
         axis = np.array(joint.axis)

@@ -29,7 +29,8 @@ _XACRO = "{http://www.ros.org/wiki/xacro}"
 class Element:
     """A joint as the file states it: origin (4, 4) in its parent link, mm; axis in its frame.
 
-    Its limits are in mm or rad, infinite where it states none.
+    Its limits are in mm or rad, infinite where it states none. `follows` is what it mimics, such as
+    "2 · lift", or "".
     """
 
     name: str
@@ -38,7 +39,7 @@ class Element:
     child: str
     origin: FloatArray
     axis: tuple[float, float, float]
-    mimics: bool
+    follows: str
     limits: tuple[float, float]
 
 
@@ -160,9 +161,12 @@ def _joint(path: str | PathLike[str], joint: ElementTree.Element) -> Element:
     pose = (*_three(place, origin, "xyz"), *_three(place, origin, "rpy"))
     home = screw.from_pose([*(_METRE * number for number in pose[:3]), *pose[3:]])
     axis = _three(place, _only(place, joint, "axis"), "xyz", default=(1.0, 0.0, 0.0))
-    mimics = _only(place, joint, "mimic") is not None
+    mimic = _only(place, joint, "mimic")
+    follows = ""
+    if mimic is not None:
+        follows = f"{mimic.get('multiplier', '1')} · {_attribute(place, mimic, 'joint')}"
     limits = _limits(place, joint, kind)
-    return Element(name, kind, ends[0], ends[1], np.asarray(home), axis, mimics, limits)
+    return Element(name, kind, ends[0], ends[1], np.asarray(home), axis, follows, limits)
 
 
 def _limits(place: str, joint: ElementTree.Element, kind: str) -> tuple[float, float]:

@@ -300,6 +300,10 @@ def calibrate(
             say(f"\nreport: {reported.paths[0]}")
             if pdf:
                 say(f"the same to print: {reported.paths[-1]}")
+        written = [each for each in (reported, output) if each is not None]
+        if written and isinstance(found.robot, pk.Robot) and found.robot.model.controller:
+            robot_file = next(path for path in written[0].paths if path.name == "robot.toml")
+            say(f"for its firmware: {found.robot.model.controller.command(str(robot_file))}")
     return 0 if found.verdict.state == "calibrated" and not doubts else 1
 
 

@@ -12,10 +12,14 @@ from pkmcal.arguments import word
 from pkmcal.cli.inputs import Inputs
 from pkmcal.cli.options import Force, Json
 from pkmcal.cli.output import Output, say
-from pkmcal.controllers.import_printer import Firmware
+from pkmcal.controllers.firmwares import Firmware
 from pkmcal.kinematics.reading_units import reading_units
 from pkmcal.measurements.measurement_writer import write_measurements
+from pkmcal.measurements.measurements import Measurements
 from pkmcal.report.as_json import as_json
+
+# What is counted in which file.
+_TABLES = {"probe.csv": "heights", "distances.csv": "distances", "belts.csv": "places"}
 
 
 def import_file(
@@ -24,42 +28,64 @@ def import_file(
         Path, typer.Option(metavar="DIR", help="Where to write; made if it is not there.")
     ] = Path("."),
     firmware: Annotated[
-        str,
-        typer.Option("--from", metavar="FIRMWARE", help=f"{', '.join(get_args(Firmware))}."),
-    ] = "klipper",
+        str | None,
+        typer.Option(
+            "--from",
+            metavar="FIRMWARE",
+            help=f"Whose file it is, where it does not show it: {', '.join(get_args(Firmware))}.",
+        ),
+    ] = None,
+    log: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="LOG", help="Of a Maslow: the log of its calibration, beside its maslow.yaml."
+        ),
+    ] = None,
     force: Force = False,
     json: Json = False,
 ) -> int:
     """Make a robot file and measurements out of a printer's configuration.
 
-    Of a linear or rotary delta with Klipper or Kalico, of a linear one with the M665 and M666 of
-    RepRapFirmware or Marlin, of a Hangprinter with M669 and M666, or of a Maslow with its
-    maslow.yaml or the log of its calibration.
-    robot.toml has the firmware's numbers; probe.csv the heights that a DELTA_CALIBRATE stored, if
-    there are any; belts.csv the belts of a Maslow's log.
+    Whose it is stands in it, or is said by --from. Of a linear or rotary delta with Klipper or
+    Kalico, of a linear one with the M665 and M666 of RepRapFirmware or Marlin, of a Hangprinter
+    with M669 and M666, or of a Maslow with its maslow.yaml, the log of its calibration, or both.
+    robot.toml has the firmware's numbers and the offset of its bed probe; probe.csv the heights
+    that a DELTA_CALIBRATE stored, distances.csv the distances of a DELTA_ANALYZE, if there are any;
+    belts.csv the belts of a Maslow's log.
 
     Example: pkmcal import examples/linear-delta/printer.cfg
     """
     read = Inputs()
-    printer = pk.import_printer(read.file(file), word("--from", firmware, get_args(Firmware)))
-    measured = printer.measurements
-    table = "belts.csv" if measured is not None and measured.kind == "closure" else "probe.csv"
-    names = ["robot.toml"] if measured is None else ["robot.toml", table]
-    output = Output(out, names, read, force)
+    whose = None if firmware is None else word("--from", firmware, get_args(Firmware))
+    belts = None if log is None else read.file(log)
+    printer = pk.import_printer(read.file(file), whose, log=belts)
+    tables = _tables(printer)
+    output = Output(out, ["robot.toml", *tables], read, force)
     with output.draft() as draft:
         (draft / "robot.toml").write_text(read.comment() + printer.text, encoding="utf-8")
-        if measured is not None:
+        for name, measured in tables.items():
             units = reading_units(printer.robot)
-            write_measurements(measured, draft / table, read.comment(), units)
+            write_measurements(measured, draft / name, read.comment(), units)
     if json:
-        rows = 0 if measured is None else len(measured)
-        places = rows if table == "belts.csv" else 0
-        counts = {"heights": rows - places, "distances": printer.distances, "places": places}
-        files = [str(path) for path in output.paths]
-        notes = list(printer.notes)
-        found = {"robot": printer.robot.name, "files": files, **counts, "notes": notes}
+        counts = {what: len(tables.get(name, ())) for name, what in _TABLES.items()}
+        probe = printer.robot.model.probe
+        found = {
+            "robot": printer.robot.name,
+            "files": [str(path) for path in output.paths],
+            **counts,
+            "probe_offset": None if probe is None else probe.tolist(),
+            "notes": list(printer.notes),
+        }
         say(as_json(found, schema="import"))
     else:
         say(printer)
         say("written: " + ", ".join(map(str, output.paths)))
     return 0
+
+
+def _tables(printer: pk.export.Printer) -> dict[str, Measurements]:
+    """What was measured, by the file it is written to."""
+    stored = printer.measurements
+    places = stored is not None and stored.kind == "closure"
+    found = {"belts.csv" if places else "probe.csv": stored, "distances.csv": printer.distances}
+    return {name: measured for name, measured in found.items() if measured is not None}

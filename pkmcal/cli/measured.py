@@ -71,7 +71,8 @@ ProbeOffset = Annotated[
     str | None,
     typer.Option(
         metavar="X,Y,Z",
-        help="Of a column probe: the firmware's offsets of the probe from the nozzle, mm.",
+        help="Of a column probe: the firmware's offsets of the probe from the nozzle, mm; by"
+        " default those of the robot file.",
     ),
 ]
 

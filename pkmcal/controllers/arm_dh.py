@@ -9,7 +9,7 @@ import numpy as np
 from pkmcal.arguments import instance
 from pkmcal.arguments import path as as_path
 from pkmcal.arms.arm import SerialArm
-from pkmcal.arms.denavit_hartenberg import Convention, DHTable
+from pkmcal.arms.denavit_hartenberg import Convention, DHTable, Parallel
 from pkmcal.arrays import FloatArray
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.atomic import write_whole
@@ -17,13 +17,18 @@ from pkmcal.files.csv_writer import write_csv
 
 _UR_JOINTS = 6
 _MOVED = 1e-6  # mm and rad: what a frame may differ by and still be the same
-_ORDER = {
-    "standard": "Rz(theta) Tz(d) Tx(a) Rx(alpha)",
-    "modified": "Rx(alpha) Tx(a) Rz(theta) Tz(d)",
+_ORDER = {  # and with Hayati's parameter
+    "standard": ("Rz(theta) Tz(d) Tx(a) Rx(alpha)", "Rz(theta) Tz(d) Tx(a) Rx(alpha) Ry(beta)"),
+    "modified": ("Rx(alpha) Tx(a) Rz(theta) Tz(d)", "Rx(alpha) Tx(a) Ry(beta) Rz(theta) Tz(d)"),
 }
 
 
-def dh(arm: SerialArm, path: str | PathLike[str], convention: Convention = "standard") -> DHTable:
+def dh(
+    arm: SerialArm,
+    path: str | PathLike[str],
+    convention: Convention = "standard",
+    parallel: Parallel = "hayati",
+) -> DHTable:
     """Write the Denavit–Hartenberg numbers of an arm as a CSV file.
 
     Parameters
@@ -34,27 +39,34 @@ def dh(arm: SerialArm, path: str | PathLike[str], convention: Convention = "stan
         Where to write; complete or untouched.
     convention : {"standard", "modified"}
         As in `SerialArm.from_dh`.
+    parallel : {"hayati", "normal"}
+        As in `SerialArm.dh`: where some axes are nearly parallel, a column beta, or a and d that
+        are large and cancel.
 
     Returns
     -------
     DHTable
         What was written: a row a joint, in mm and deg; base and tool in comments.
     """
-    table = instance("arm", arm, SerialArm).dh(convention)
+    table = instance("arm", arm, SerialArm).dh(convention, parallel)
+    leaning = table.beta is not None and bool(table.beta.any())
     comment = (
         f"# {_line(arm.name)}: {convention} Denavit-Hartenberg numbers,"
-        f" {_ORDER[convention]} a row\n"
+        f" {_ORDER[convention][leaning]} a row\n"
         + _matrix("base, the first frame in it", table.base)
         + _matrix("tool, in the last frame", table.tool)
     )
     names = arm.joint_names or tuple(str(i + 1) for i in range(arm.n_joints))
     degrees = np.degrees([table.alpha, table.theta])
     columns = [table.a, degrees[0], table.d, degrees[1]]
+    heads = ["joint", "kind", "a [mm]", "alpha [deg]", "d [mm]", "theta [deg]"]
+    if table.beta is not None and leaning:
+        columns.append(np.degrees(table.beta))
+        heads.append("beta [deg]")
     rows = (
         [name, arm.kinds[i], *(repr(float(column[i])) for column in columns)]
         for i, name in enumerate(names)
     )
-    heads = ["joint", "kind", "a [mm]", "alpha [deg]", "d [mm]", "theta [deg]"]
     write_csv(as_path("path", path), heads, rows, comment=comment)
     return table
 

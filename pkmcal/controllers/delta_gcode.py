@@ -3,7 +3,11 @@
 Both have towers at 210°, 330° and 90° plus a correction X Y Z each, and a height H of the nozzle.
 RepRapFirmware: a carriage at its switch is at H + √(L² - R²) + adjustment, and adjustments have the
 mean 0. Marlin: from the switch a carriage moves by its adjustment, never upwards, and is then at
-H + √((L + trim)² - R²).
+H - Z + √((L + trim)² - R²), where Z of M851 is the bed probe's offset, 0 without a probe
+(set_axis_is_at_home in its module/motion.cpp): H and M851 belong together.
+
+Offsets of a bed probe are Klipper's in a robot file: z is the nozzle's height when it triggers.
+That is Z of RepRapFirmware's G31, and -Z of M851.
 
 RepRapFirmware's M666 A B tilts the bed: carriages go by z + A x + B y, in percent. A robot file has
 no such numbers; the bed of an exported robot is level.
@@ -17,6 +21,7 @@ import numpy as np
 
 from pkmcal.arguments import flag
 from pkmcal.arguments import path as as_path
+from pkmcal.arrays import FloatArray
 from pkmcal.controllers.gcode_words import (
     TOWERS,
     Commands,
@@ -33,13 +38,13 @@ from pkmcal.controllers.gcode_words import (
 )
 from pkmcal.controllers.linear_delta import FirmwareDelta, of_robot
 from pkmcal.controllers.loss import Loss
+from pkmcal.controllers.reprap_files import own_config
 from pkmcal.controllers.rotary_delta import is_rotary_delta
 from pkmcal.controllers.rotary_delta import of_robot as rotary_of_robot
 from pkmcal.controllers.rotary_gcode import reprap_commands as rotary_commands
 from pkmcal.controllers.rotary_gcode import reprap_lines as rotary_lines
-from pkmcal.exceptions import FileError
+from pkmcal.exceptions import ArgumentError, FileError
 from pkmcal.files.atomic import write_whole
-from pkmcal.files.text_lines import text_in
 from pkmcal.kinematics.robot import Robot
 
 
@@ -79,7 +84,7 @@ def reprap(
     """
     path, project = as_path("path", path), flag("project", project)
     place = str(as_path("config", "config.g" if config is None else config))
-    text = None if config is None else text_in(config, "surrogateescape")
+    text = None if config is None else own_config(config)
     shift = 0.0 if text is None else mean_adjustment(text, place)
     if is_rotary_delta(robot):
         turning, loss = rotary_of_robot(robot, project, one_height=False)
@@ -96,12 +101,13 @@ def reprap(
 
 
 def marlin(robot: Robot, path: str | PathLike[str], project: bool = False) -> Loss:
-    """Write a linear delta's numbers for Marlin 2: M665 and M666.
+    """Write a linear delta's numbers for Marlin 2: M665, M666, and the M851 that H goes with.
 
     Parameters
     ----------
     robot : Robot
-        A linear delta whose actuator coordinates are 0 at the end stops.
+        A linear delta whose actuator coordinates are 0 at the end stops, and whose file states the
+        offset of its bed probe.
     path : str or path
         Where to write; an existing file is replaced, whole or not at all.
     project : bool, optional
@@ -115,11 +121,18 @@ def marlin(robot: Robot, path: str | PathLike[str], project: bool = False) -> Lo
     Raises
     ------
     ValueError
-        The firmware cannot hold the robot; nothing is written.
+        The firmware cannot hold the robot, or the offset is not stated; nothing is written.
     """
     path = as_path("path", path)
     firmware, loss = of_robot(robot, flag("project", project))
-    write_whole(path, marlin_text(firmware))
+    if robot.model.probe is None:
+        raise ArgumentError(
+            f"robot: {robot.name}: Marlin homes the nozzle to H - Z of M851 above the bed, and the"
+            " robot file does not state its bed probe: add [probe] and offset = { z = Z } to it,"
+            " the nozzle's height in mm when the probe triggers, which is -Z of M851; z = 0 for a"
+            " printer without a bed probe"
+        )
+    write_whole(path, marlin_text(firmware, robot.model.probe))
     return loss
 
 
@@ -137,13 +150,14 @@ def mean_adjustment(text: str, place: str) -> float:
     return float(np.mean([number(ends, letter, "M666", place, 0.0) for letter in "XYZ"]))
 
 
-def marlin_text(firmware: FirmwareDelta) -> str:
-    """The two lines for Marlin."""
+def marlin_text(firmware: FirmwareDelta, probe: FloatArray) -> str:
+    """The three lines for Marlin: it homes to H less Z of M851."""
     height, rod = min(firmware.endstops), float(np.mean(firmware.arms))
-    size = each("LRH", [rod, firmware.radius, height]) | off_towers(firmware.angles)
+    x, y, z = probe.tolist()
+    size = each("LRH", [rod, firmware.radius, height - z]) | off_towers(firmware.angles)
     trims = each("ABC", [arm - rod for arm in firmware.arms])
     ends = each("XYZ", [height - endstop for endstop in firmware.endstops])
-    return lines({"M665": size | trims, "M666": ends})
+    return lines({"M665": size | trims, "M666": ends, "M851": each("XYZ", [x, y, -z])})
 
 
 def of_reprap(text: str, place: str = "M665") -> FirmwareDelta:
@@ -170,7 +184,7 @@ def of_reprap(text: str, place: str = "M665") -> FirmwareDelta:
 
 
 def of_marlin(text: str, place: str = "M665") -> FirmwareDelta:
-    """The delta of M665 and M666 as Marlin's M503 lists them.
+    """The delta of M665, M666 and M851 as Marlin's M503 lists them.
 
     Raises
     ------
@@ -182,7 +196,7 @@ def of_marlin(text: str, place: str = "M665") -> FirmwareDelta:
     size, ends = settings(text, "M665", place), settings(text, "M666", place)
     radius, rod = number(size, "R", "M665", place), number(size, "L", "M665", place)
     arms = [rod + number(size, letter, "M665", place, 0.0) for letter in "ABC"]
-    height = number(size, "H", "M665", place)
+    height = number(size, "H", "M665", place) + marlin_probe(text, place)[2]
     adjustments = [number(ends, letter, "M666", place, 0.0) for letter in "XYZ"]
     if max(adjustments) > 0.0:
         raise FileError(
@@ -191,6 +205,40 @@ def of_marlin(text: str, place: str = "M665") -> FirmwareDelta:
         )
     ats = [height - adjustment for adjustment in adjustments]
     return _delta(size, radius, arms, ats, place)
+
+
+def marlin_probe(text: str, place: str) -> tuple[float, float, float]:
+    """The offset of Marlin's bed probe.
+
+    Raises
+    ------
+    ValueError
+        There is no M851, without which H does not say where the nozzle homes.
+    """
+    found = settings(text, "M851", place, missing=True)
+    if not found:
+        raise FileError(
+            f"{place}: M851 is missing: with a bed probe Marlin homes to H - Z of M851, so that H"
+            " alone does not say where the nozzle is; add the line M851 of M503, or M851 Z0 if"
+            " M503 lists none: then there is no bed probe"
+        )
+    x, y = (number(found, letter, "M851", place, 0.0) for letter in "XY")
+    return x, y, -number(found, "Z", "M851", place)
+
+
+def reprap_probe(text: str, place: str) -> tuple[float, float, float] | None:
+    """The offset of RepRapFirmware's bed probe K0; None where G31 does not set its height.
+
+    Raises
+    ------
+    ValueError
+        It is no plain number, or set under a condition.
+    """
+    found = settings(text, "G31", place, missing=True, kind="0")
+    if "Z" not in found:
+        return None
+    x, y = (number(found, letter, "G31", place, 0.0) for letter in "XY")
+    return x, y, number(found, "Z", "G31", place)
 
 
 def _delta(

@@ -38,6 +38,15 @@ class Setting(NamedTuple):
     end: int
 
 
+class Command(NamedTuple):
+    """A line: where it ends, its code, the words behind it, whether it is under a condition."""
+
+    end: int
+    code: str
+    words: str
+    conditional: bool
+
+
 Settings = dict[str, Setting]
 Commands = Mapping[str, Mapping[str, Sequence[float]]]  # numbers by command and letter
 
@@ -68,10 +77,13 @@ def off_towers(angles: Sequence[float]) -> dict[str, list[float]]:
     return each("XYZ", [(angle - tower + 180.0) % 360.0 - 180.0 for angle, tower in pairs])
 
 
-def settings(text: str, command: str, place: str, missing: bool = False) -> Settings:
+def settings(
+    text: str, command: str, place: str, missing: bool = False, kind: str = ""
+) -> Settings:
     """The words of a command: what was set last, in one of them or in several.
 
-    Another K starts anew: it is another kinematics. With `missing` there may be no such command.
+    Another K starts anew: it is another kinematics. With `kind` those of another K are passed over,
+    and those without K are of this one. With `missing` there may be no such command.
 
     Raises
     ------
@@ -92,12 +104,28 @@ def settings(text: str, command: str, place: str, missing: bool = False) -> Sett
         if _in_a_block(text, line):
             raise _wrong(line, place, f"{command} under a condition, which cannot be followed")
         new = _words_of(line, code[1], command, place)
+        if kind and "K" in new and new["K"].value != kind:
+            continue
         if "K" in new and new["K"].value != found.get("K", new["K"]).value:
             found = {}
         found |= new
     if not times and not missing:
         raise FileError(f"{place}: {command} is missing")
     return found
+
+
+def commanded(text: str, *codes: str) -> list[Command]:
+    """The lines with these commands."""
+    return [
+        Command(
+            line.end(),
+            code[0],
+            _without_remarks(line[0])[code[1] :].strip(),
+            _in_a_block(text, line),
+        )
+        for line, code in _codes(text)
+        if code[0] in codes
+    ]
 
 
 def in_inches(text: str) -> bool:

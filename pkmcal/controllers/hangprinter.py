@@ -30,9 +30,10 @@ from pkmcal.controllers.gcode_words import (
 )
 from pkmcal.controllers.laws import require_no_laws, require_no_pulleys
 from pkmcal.controllers.loss import Loss, cylinder, fitted, require_held
+from pkmcal.controllers.reprap_files import own_config
+from pkmcal.controllers.robot_files import About
 from pkmcal.exceptions import ArgumentError, FileError
 from pkmcal.files.atomic import write_whole
-from pkmcal.files.text_lines import text_in
 from pkmcal.geometry.laws import Law
 from pkmcal.kinematics.robot import Robot, require_parallel
 
@@ -111,7 +112,7 @@ def hangprinter(
     path, project = as_path("path", path), flag("project", project)
     require_parallel(robot)
     spooled = _require(robot)
-    text = None if config is None else text_in(config)
+    text = None if config is None else own_config(config)
     place = str(as_path("config", "M669" if config is None else config))
     there = None if text is None else _of_text(text, place)
     geared = None if there is None else there.spools
@@ -130,7 +131,8 @@ def hangprinter(
     )
     require_held(robot, lost, project, lacks)
     found = model(x)
-    write_whole(path, text_of(found) if text is None else changed(text, place, _commands(found)))
+    new = text_of(found) if text is None else changed(text, place, _commands(found))
+    write_whole(path, new.encode("utf-8", "surrogateescape"))
     return lost
 
 
@@ -210,10 +212,10 @@ def _commands(found: Hangprinter) -> Commands:
 
 def as_robot(machine: Hangprinter) -> Robot:
     """The robot with these numbers."""
-    return robot_files.robot_of(robot_text(machine, "hangprinter"), "M669")
+    return robot_files.robot_of(robot_text(machine, About("hangprinter")), "M669")
 
 
-def robot_text(machine: Hangprinter, name: str, head: str = "") -> str:
+def robot_text(machine: Hangprinter, about: About) -> str:
     """A robot file with these numbers; home is below the highest anchor."""
     home = round(0.2 * float(machine.anchors[:, 2].max()), 3)
     pose = {"map": "translation", "home": {"z": home}}
@@ -235,7 +237,7 @@ def robot_text(machine: Hangprinter, name: str, head: str = "") -> str:
         ):
             limb["gain"] = turn
             limb["drive"] = {"spool": radius, "buildup": -lines * spools.buildup}
-    return robot_files.text_of(name, head, pose, free, limbs)
+    return robot_files.text_of(about, pose, free, limbs)
 
 
 def _model(

@@ -16,12 +16,16 @@ from pkmcal.arrays import FloatArray
 from pkmcal.controllers import robot_files
 from pkmcal.controllers.laws import require_plain_limbs
 from pkmcal.controllers.loss import Loss, cylinder, fitted, require_held
+from pkmcal.controllers.robot_files import About
 from pkmcal.core.library import SLOTS
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.robot import Robot, require_parallel
 
 _TOWERS = 3
 _POSES = 300
+_FREE = ("radius", "angle1", "angle2", "offset1", "offset2", "offset3")
+_RODS = ("rod1", "rod2", "rod3")
+_HELD_RODS = "; heights hardly determine the rods"
 
 
 @dataclass(frozen=True)
@@ -142,16 +146,16 @@ def _with_numbers(x: FloatArray) -> FirmwareDelta:
 
 def as_robot(firmware: FirmwareDelta, gains: Sequence[float]) -> Robot:
     """The robot with the firmware's numbers."""
-    text = text_of(firmware, gains, "linear delta")
+    text = text_of(firmware, gains, About("linear delta"))
     return robot_files.robot_of(text, "the firmware's numbers")
 
 
 def text_of(
     firmware: FirmwareDelta,
     gains: Sequence[float],
-    name: str,
-    head: str = "",
+    about: About,
     bed: bool = False,
+    rods: bool = False,
 ) -> str:
     """A robot file with the firmware's numbers.
 
@@ -161,10 +165,12 @@ def text_of(
         The numbers.
     gains : sequence of float
         Mm a carriage rises for a unit of its actuator, which is 0 at the end stop.
-    name, head : str
-        The robot's name; lines of comment.
+    about : About
+        Its name and where it comes from.
     bed : bool
         Whether the nozzle stays between the towers, over the bed and below the end stops.
+    rods : bool
+        Whether a calibration frees the rods: where distances across the bed were measured.
     """
     across, high = round(firmware.radius, 3), round(min(firmware.endstops), 3)
     box = {"x": [-across, across], "y": [-across, across], "z": [0.0, high]}
@@ -186,12 +192,11 @@ def text_of(
         )
     ]
     return robot_files.text_of(
-        name,
-        head,
+        about,
         {"map": "translation", "home": {"z": round(0.5 * max(firmware.endstops), 3)}},
-        ["radius", "angle1", "angle2", "offset1", "offset2", "offset3"],
+        [*_FREE, *_RODS] if rods else _FREE,
         limbs,
         parameters,
-        "# Heights do not determine which way x is, so angle3 stays, and hardly the rods.\n",
+        f"# Nothing determines which way x is, so angle3 stays{'' if rods else _HELD_RODS}.\n",
         box if bed and across > 0 and high > 0 else None,
     )

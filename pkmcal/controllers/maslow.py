@@ -21,6 +21,7 @@ from pkmcal.controllers import robot_files
 from pkmcal.controllers.gcode_words import SAME
 from pkmcal.controllers.laws import require_plain_limbs
 from pkmcal.controllers.loss import Loss, fitted, require_held
+from pkmcal.controllers.robot_files import About
 from pkmcal.exceptions import ArgumentError, FileError
 from pkmcal.files.atomic import write_whole
 from pkmcal.files.text_lines import text_in
@@ -124,7 +125,10 @@ def of_text(text: str, place: str) -> tuple[FloatArray, FloatArray]:
     values = dict.fromkeys(_ZERO, 0.0)
     values |= {found["name"]: float(found["value"]) for found in _ANCHOR.finditer(text)}
     if missing := [name for name in _NAMES if name not in values]:
-        raise FileError(f"{place}: no number for {', '.join(missing)}: anchors of a Maslow")
+        raise FileError(
+            f"{place}: no number for {', '.join(missing)}: anchors of a Maslow; they are in its"
+            " maslow.yaml, with which its log goes as log (--log)"
+        )
     if far := [name for name in _NAMES if not abs(values[name]) <= LARGEST]:
         raise FileError(
             f"{place}: {far[0]} must be at most {LARGEST:g} mm, found {values[far[0]]:g}"
@@ -145,17 +149,17 @@ def of_text(text: str, place: str) -> tuple[FloatArray, FloatArray]:
 
 def as_robot(anchors: FloatArray) -> Robot:
     """The robot with these anchors (4, 2)."""
-    return robot_files.robot_of(robot_text(anchors, "maslow"), "maslow.yaml")
+    return robot_files.robot_of(robot_text(anchors, About("maslow")), "maslow.yaml")
 
 
-def robot_text(anchors: FloatArray, name: str, head: str = "") -> str:
+def robot_text(anchors: FloatArray, about: About) -> str:
     """A robot file with these anchors; home is in their middle."""
     home = dict(zip("xy", np.round(anchors.mean(axis=0), 3).tolist(), strict=True))
     limbs = [
         {"kind": "cable", "base": [x, y, 0.0], "platform": [0.0, 0.0, 0.0]}
         for x, y in anchors.tolist()
     ]
-    return robot_files.text_of(name, head, {"map": "xy", "home": home}, _FREE, limbs)
+    return robot_files.text_of(about, {"map": "xy", "home": home}, _FREE, limbs)
 
 
 def _corners(robot: Robot) -> list[int]:

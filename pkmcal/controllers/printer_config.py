@@ -29,6 +29,11 @@ SAME = 5e-7  # of numbers with six decimals
 
 _SAVED = re.compile(r"#\*# <-+ SAVE_CONFIG -+>")
 _PREFIX = "#*# "
+_HEADER = (  # letter for letter, or the firmware finds no block (_find_autosave_data)
+    "#*# <---------------------- SAVE_CONFIG ---------------------->",
+    "#*# DO NOT EDIT THIS BLOCK OR BELOW. The contents are auto-generated.",
+    "#*#",
+)
 _SECTION = re.compile(r"\[([^\]]+)\]")
 _INCLUDE = re.compile(r"\[include +([^\]]+)\]")
 _OPTION = re.compile(r"(?P<name>.*?)\s*[:=]\s*(?P<value>.*)")
@@ -131,7 +136,8 @@ class PrinterConfig:
             lines = lines[:-1]
         for i, whole in enumerate(lines):
             line = whole.rstrip("\r\n")
-            if len(within) == 1 and _SAVED.match(line):
+            if len(within) == 1 and saved is None and _SAVED.match(line):
+                self._require_block(i, lines)
                 saved = _Reader(file)
             elif saved is not None:
                 self._require_saved(i, line)
@@ -150,12 +156,31 @@ class PrinterConfig:
             self._options = saved.options | self._options
             self._saved = saved.ends
 
+    def _require_block(self, i: int, lines: list[str]) -> None:
+        """Refuse a block of SAVE_CONFIG that begins in line i, where the firmware leaves it out."""
+        said = tuple(line.rstrip("\r\n") for line in lines[i : i + len(_HEADER)])
+        if said != _HEADER or not i:
+            raise FileError(
+                f"{self.place}, line {i + 1}: the three lines of SAVE_CONFIG's header, below"
+                " another line, are not letter for letter the firmware's, and it leaves the whole"
+                " block out: restore them, or delete the block"
+            )
+        for above, line in enumerate(lines[1:i], 2):
+            if line.startswith(_PREFIX):
+                raise FileError(
+                    f"{self.place}, line {above}: begins with {_PREFIX!r} above SAVE_CONFIG, and"
+                    " the firmware leaves the whole block out: delete the line, or begin it with"
+                    " '# '"
+                )
+
     def _require_saved(self, i: int, line: str) -> None:
         """Refuse lines for which the firmware would leave the block of SAVE_CONFIG out."""
-        if line != _PREFIX.rstrip() and not line.startswith(_PREFIX):
+        unlike = line != _PREFIX.rstrip() and not line.startswith(_PREFIX)
+        if unlike or _SAVED.match(line):
             raise FileError(
                 f"{self.place}, line {i + 1}: behind SAVE_CONFIG lines must begin with"
-                f" {_PREFIX!r}, or the firmware leaves the whole block out: move others above it"
+                f" {_PREFIX!r} and not repeat its header, or the firmware leaves the whole block"
+                " out: move others above it"
             )
 
     def _include(self, named: str, within: tuple[str, ...]) -> None:
@@ -174,6 +199,10 @@ class PrinterConfig:
     def has(self, section: str, option: str) -> bool:
         """Whether there is such an option."""
         return (section, option) in self._options
+
+    def sections(self, option: str) -> list[str]:
+        """The sections that have such an option."""
+        return [section for section, name in self._options if name == option]
 
     def text(self, section: str, option: str, default: str | None = None, depth: int = 0) -> str:
         """What an option says, `depth` names away from the one that was asked for.
@@ -248,8 +277,8 @@ class PrinterConfig:
                     raise self.wrong(
                         section,
                         option,
-                        f"would be {new}, in an included file, which is not changed; without"
-                        " config the lines alone are written",
+                        f"would be {new}, in an included file, which is not changed: give that"
+                        " file as config (--config), or none, which writes the lines alone",
                     )
                 line = text[place.line]
                 text[place.line] = line[: place.start] + new + line[place.end :]

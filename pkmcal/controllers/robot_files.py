@@ -3,16 +3,44 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
 from pkmcal.files.toml_lines import Source
 from pkmcal.geometry import robot_file
+from pkmcal.geometry.controller import Controller, controller_table
+from pkmcal.geometry.probe_offset import probe_table
 from pkmcal.geometry.robot_file_writer import lines
 from pkmcal.kinematics.robot import Robot
 
+_PROBE_REMARK = """\
+# The firmware's bed probe: it touches beside the nozzle by x and y, which is then z above the bed.
+"""
+
+
+@dataclass(frozen=True)
+class About:
+    """What a robot file says beside the machine.
+
+    Attributes
+    ----------
+    name : str
+        The robot's name.
+    head : str
+        Lines of comment.
+    probe : sequence of float or None
+        Offset of the firmware's bed probe, mm.
+    controller : Controller or None
+        The firmware.
+    """
+
+    name: str
+    head: str = ""
+    probe: Sequence[float] | None = None
+    controller: Controller | None = None
+
 
 def text_of(
-    name: str,
-    head: str,
+    about: About,
     pose: Mapping[str, object],
     free: Sequence[str],
     limbs: Iterable[Mapping[str, object]],
@@ -24,8 +52,8 @@ def text_of(
 
     Parameters
     ----------
-    name, head : str
-        The robot's name; lines of comment.
+    about : About
+        Its name and where it comes from.
     pose, free, limbs, parameters
         What the file's keys of these names say.
     remark : str
@@ -33,10 +61,15 @@ def text_of(
     workspace : mapping, optional
         Ends of coordinates.
     """
-    blocks = [head, lines({"name": name, "units": {"length": "mm", "angle": "deg"}})]
+    top = {"name": about.name, "units": {"length": "mm", "angle": "deg"}}
+    blocks = [about.head, lines(top)]
     blocks.append("[pose]\n" + lines(pose))
     if workspace:
         blocks.append("[workspace]\n" + lines(workspace))
+    if about.controller is not None:
+        blocks.append("[controller]\n" + lines(controller_table(about.controller)))
+    if about.probe is not None:
+        blocks.append(_PROBE_REMARK + "[probe]\n" + lines(probe_table(about.probe)))
     if parameters:
         blocks.append("[parameters]\n" + lines(parameters))
     blocks.append(remark + "[calibration]\n" + lines({"free": free}))

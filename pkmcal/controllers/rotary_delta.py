@@ -16,6 +16,7 @@ from pkmcal.controllers import robot_files
 from pkmcal.controllers.c_limbs import prepared
 from pkmcal.controllers.laws import require_plain_limbs
 from pkmcal.controllers.loss import Loss, fitted, require_held
+from pkmcal.controllers.robot_files import About
 from pkmcal.core.library import SLOTS
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.robot import Robot, require_parallel
@@ -159,11 +160,11 @@ def as_built(robot: Robot, one_height: bool = True) -> RotaryDelta:
 
 def as_robot(delta: RotaryDelta, home: float) -> Robot:
     """The robot with these numbers, as it is in `text_of`."""
-    text = text_of(delta, home, "rotary delta")
+    text = text_of(delta, home, About("rotary delta"))
     return robot_files.robot_of(text, "the firmware's numbers")
 
 
-def text_of(delta: RotaryDelta, home: float, name: str, head: str = "") -> str:
+def text_of(delta: RotaryDelta, home: float, about: About) -> str:
     """A robot file with these numbers.
 
     Parameters
@@ -172,8 +173,8 @@ def text_of(delta: RotaryDelta, home: float, name: str, head: str = "") -> str:
         The numbers.
     home : float
         Height of the home pose, mm.
-    name, head : str
-        The robot's name; lines of comment.
+    about : About
+        Its name and where it comes from.
     """
     alike = len(set(delta.heights)) == 1
     parameters = {"radius": delta.radius} | ({"height": delta.heights[0]} if alike else {})
@@ -198,7 +199,7 @@ def text_of(delta: RotaryDelta, home: float, name: str, head: str = "") -> str:
         limb |= {"offset": float(np.degrees(delta.elbows[i])), "branch": 1}
         limb |= {"gain": delta.gains[i]}
         limbs.append(limb)
-    return robot_files.text_of(name, head, pose, free, limbs, parameters, remark)
+    return robot_files.text_of(about, pose, free, limbs, parameters, remark)
 
 
 def _point(x: float, y: float) -> list[float]:

@@ -103,7 +103,8 @@ _DRIVEN = re.compile(
     r" )?(?:q|j|a|joint|axis|leg|limb|strut|actuator|act|motor|drive|slider|carriage|tower|encoder"
     r"|length|l|leg length|strut length|joint angle|joint position|joint pos|axis pos|theta"
     r"|joint states position|joint state position|joint positions|jointpos"
-    r"|bein|achse|gelenk|strebe|antrieb|axe|jambe))"
+    r"|cable|winch|belt|rope|wire|tendon|spool|line|tackle"
+    r"|bein|achse|gelenk|strebe|antrieb|seil|winde|kabel|riemen|axe|jambe|câble|treuil))"
     r" ?(?P<number>[0-9]{1,2})"
     r"(?P<end>(?: (?:pos|position|length|angle|actual|act|value|fbk|feedback|cmd))*)"
 )

@@ -27,7 +27,10 @@ def text_in(
     try:
         return content(path, MOST_TEXT).decode("utf-8", errors)
     except UnicodeDecodeError:
-        raise FileError(f"{as_path('path', path)}: this is no text in UTF-8") from None
+        raise FileError(
+            f"{as_path('path', path)}: this is no text in UTF-8: save it as UTF-8, in an"
+            " editor by Save as, Encoding"
+        ) from None
 
 
 def lines_of(text: str) -> list[str]:

@@ -15,18 +15,21 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from pkmcal.exceptions import FileError
+from pkmcal.files.height_map import bed_points, is_height_map
 from pkmcal.files.text_lines import lines_of
 
 SEPARATORS = ("\t", ";", ",", " ")  # the first of those that fit equally well
 _LOOKED_AT = 200  # lines
 _COMMENT = re.compile(r"\s*(?:#|//|%)+")
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:[.,][0-9]*)?|[.,][0-9]+)(?:[eE][+-]?[0-9]+)?")
-_TRIGGER = re.compile(  # Klipper until 2025 and Kalico; Marlin
+_TRIGGER = re.compile(  # Klipper until 2025 and Kalico
     r"probe at (-?[0-9.]+),(-?[0-9.]+) is z=(-?[0-9.]+)"
-    r"|Bed X: ?(-?[0-9.]+) Y: ?(-?[0-9.]+) Z: ?(-?[0-9.]+)"
 )
-_CONTACT = re.compile(  # Klipper since: not of the nozzle when it triggered, but of the bed
+# Klipper since, and Marlin (Probe::probe_at_point): not of the nozzle when the probe triggered, but
+# of the bed, with the offsets of the probe taken in.
+_CONTACT = re.compile(
     r"probe: at (-?[0-9.]+),(-?[0-9.]+) bed will contact at z=(-?[0-9.]+)"
+    r"|Bed X: ?(-?[0-9.]+) Y: ?(-?[0-9.]+) Z: ?(-?[0-9.]+)"
 )
 _REPORTS = ("probe at ", "Bed X:", "bed will contact at")  # what such lines hold
 _GAP = re.compile(r" {2,}")
@@ -72,6 +75,11 @@ def text_rows(path: Path, content: bytes) -> TextRows:
             found.comments.append((number, line[match.end() :].strip()))
         else:
             lines.append((number, line.rstrip("\n")))
+    if is_height_map(text):
+        points = bed_points(path, lines)
+        found.rows = [(lines[0][0], ["x [mm]", "y [mm]", "contact [mm]"]), *points]
+        found.notes.append(f"a height map with {len(points)} points that were probed")
+        return found
     if any(words in text for words in _REPORTS):
         reports = {
             what: [(n, m) for n, line in enumerate(lines_of(text), 1) if (m := form.search(line))]

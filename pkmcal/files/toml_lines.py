@@ -69,7 +69,11 @@ class Source:
             self.text = content.decode("utf-8-sig").replace("\r\n", "\n")
             self.line_end = "\r\n" if b"\r\n" in content else "\n"
         except UnicodeDecodeError as error:
-            raise FileError(f"{place}: not a text file in UTF-8 (byte {error.start})") from None
+            at = content.count(b"\n", 0, error.start) + 1
+            raise FileError(
+                f"{place}, line {at}: not a text file in UTF-8 (byte {error.start}): save it as"
+                " UTF-8, in an editor by Save as, Encoding"
+            ) from None
         for number, line in enumerate(self.text.split("\n"), 1):
             if line.count(".") > _MOST_DOTS:  # the parser's time grows with their square
                 raise FileError(f"{place}, line {number}: more than {_MOST_DOTS} dots on a line")

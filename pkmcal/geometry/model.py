@@ -15,6 +15,7 @@ from pkmcal.core.pulleys import BENT
 from pkmcal.display import Table, fixed
 from pkmcal.geometry.box import Box
 from pkmcal.geometry.chains import Chains
+from pkmcal.geometry.controller import Controller
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.laws import Law, drive
 from pkmcal.geometry.limb_kinds import KINDS
@@ -154,6 +155,11 @@ class Model:
         a bed or a frame being in the way. Empty where the file states none.
     load : Load or None
         What acts on the platform, of a machine on cables whose file states it.
+    probe : ndarray (3,) or None
+        Offset of the bed probe of a printer's firmware, mm: it touches at the nozzle's x and y
+        plus the first two, and the nozzle is then the third above the bed. None: not stated.
+    controller : Controller or None
+        The firmware from which the numbers were imported.
     """
 
     name: str
@@ -171,6 +177,8 @@ class Model:
     chains: Chains | None = None
     workspace: Box = field(default_factory=dict)
     load: Load | None = None
+    probe: FloatArray | None = None
+    controller: Controller | None = None
 
     def __post_init__(self) -> None:
         if self.load is not None:  # some of its numbers may be those of the geometry

@@ -21,10 +21,12 @@ from pkmcal.files.atomic import write_whole
 from pkmcal.files.toml_lines import Source
 from pkmcal.files.toml_table import ANGLE_UNITS, LENGTH_UNITS, Table, Units, shown
 from pkmcal.geometry.box import read_box
+from pkmcal.geometry.controller import read_controller
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.load import Load, read_load
 from pkmcal.geometry.model import CHAIN, Limb, Model
+from pkmcal.geometry.probe_offset import read_probe
 from pkmcal.geometry.robot_file_chains import chain_limbs, read_chains
 from pkmcal.geometry.robot_file_laws import refuse_turning
 from pkmcal.geometry.robot_file_limbs import Limbs, Parameters, read_limbs
@@ -35,8 +37,8 @@ from pkmcal.geometry.robot_file_writer import text_of
 STATED_SIZES = ("base_radius", "base_diameter", "platform_radius", "platform_diameter", "length")
 INDEPENDENT = "independent"  # the default free set of a file that names none: found when loaded
 TOP = (
-    "name", "units", "closure_tolerance", "frames", "pose", "workspace", "load", "parameters",
-    "calibration", "stated", "limb", "tail",
+    "name", "units", "closure_tolerance", "frames", "pose", "workspace", "load", "probe",
+    "controller", "parameters", "calibration", "stated", "limb", "tail",
 )  # fmt: skip
 
 
@@ -181,6 +183,8 @@ def parse(source: Source, file: str | None) -> Model:
         closure_tolerance=_read_tolerance(top),
         workspace=read_box(_section(top, "workspace")),
         load=load,
+        probe=read_probe(top.table("probe")) if "probe" in top else None,
+        controller=read_controller(top.table("controller")) if "controller" in top else None,
         file=file,
     )
     refuse_turning(model, described)

@@ -7,10 +7,12 @@ from typing import Any
 
 from pkmcal.arrays import FloatArray
 from pkmcal.core.library import AXES, MAPS, POSE
+from pkmcal.geometry.controller import controller_table
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.load import is_of_load, load_table
 from pkmcal.geometry.model import Cone, Limb, Model
+from pkmcal.geometry.probe_offset import probe_table
 from pkmcal.geometry.robot_file_chain_writer import chain_tables, tail_tables
 from pkmcal.geometry.robot_file_laws import law_table
 from pkmcal.geometry.ties import LimbNumber, Term
@@ -72,6 +74,8 @@ def _sections(model: Model) -> dict[str, Mapping[str, Any]]:
         "frames": {k: _pose(v, POSE) for k, v in frames.items() if v is not None},
         "workspace": {name: list(ends) for name, ends in model.workspace.items()},
         "load": {} if model.load is None else load_table(model.load),
+        "probe": {} if model.probe is None else probe_table(model.probe),
+        "controller": {} if model.controller is None else controller_table(model.controller),
         "parameters": {
             name: geometry[name] for name in geometry.parameters if not is_of_load(name)
         },

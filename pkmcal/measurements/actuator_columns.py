@@ -63,18 +63,23 @@ def read_actuators(table: Table, robot: Actuated | None) -> tuple[FloatArray, tu
     columns, units = [], []
     for i in range(count):
         of_robot = expected[i] if i < len(expected) else None
-        quantities = _QUANTITIES[of_robot]
-        values, unit = table.numbers(f"q{i + 1}", *quantities, expected=of_robot)
-        if unit == "count":
-            unit = _counted(table, i, of_robot, robot)
+        values, unit = _read(table, f"q{i + 1}", i, of_robot, robot)
         columns.append(values)
         units.append(unit)
     return np.stack(columns, axis=1), tuple(units)
 
 
-def _counted(table: Table, i: int, of_robot: str | None, robot: Actuated | None) -> str:
+def _read(
+    table: Table, name: str, i: int, expected: str | None, robot: Actuated | None
+) -> tuple[FloatArray, str]:
+    """A column of actuator i, counted from 0, and its unit."""
+    values, unit = table.numbers(name, *_QUANTITIES[expected], expected=expected)
+    return values, _counted(table, name, i, expected, robot) if unit == "count" else unit
+
+
+def _counted(table: Table, name: str, i: int, of_robot: str | None, robot: Actuated | None) -> str:
     """The unit of an actuator that counts steps: its limb's gain says how much one is."""
-    column = table.columns[f"q{i + 1}"]
+    column = table.columns[name]
     if of_robot is None:
         raise table.header_error(
             f"column {column.name!r} has unit [{column.unit}]: give the robot, whose gain says"

@@ -65,8 +65,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal import arguments
-from pkmcal.arrays import FloatArray, as_rows
-from pkmcal.exceptions import ArgumentError, ArgumentTypeError, FileError
+from pkmcal.arrays import FloatArray
+from pkmcal.exceptions import ArgumentTypeError, FileError
 from pkmcal.files.column_names import ANGLES, SYNONYMS, orientation_in
 from pkmcal.files.csv_table import Table
 from pkmcal.kinematics.calibratable import as_machine
@@ -83,6 +83,7 @@ from pkmcal.measurements.probe import (
     apart_from,
     is_of_a_flat,
     is_of_trigger,
+    offset_of,
     probed,
 )
 from pkmcal.measurements.table_layout import (
@@ -116,7 +117,7 @@ def read_measurements(
     header: Sequence[str] = (),
     units: str | Sequence[str] = (),
     rotation: str | None = None,
-    probe_offset: ArrayLike = (0.0, 0.0, 0.0),
+    probe_offset: ArrayLike | None = None,
     kind: Reading | None = None,
 ) -> Measurements:
     r"""Read measurements from a CSV file; its module lists the columns.
@@ -151,7 +152,8 @@ def read_measurements(
         How orientations are stated where headings do not say: "ZYX" or another order of axes,
         each about the turned axis; "xyz", about fixed axes; "rotvec"; "wxyz" or "xyzw".
     probe_offset : (3,) array
-        Of a column ``probe``: the firmware's offsets of the probe, mm, as in `probed`.
+        Of a column ``probe``: the firmware's offsets of the probe, mm, as in `probed`; by default
+        those of the robot file.
     kind : Reading, optional
         A reading of your own that the file may hold.
 
@@ -239,7 +241,7 @@ def _read_fields(table: Table, read: Reading, units: Sequence[str]) -> dict[str,
     return found | {"lines": np.array(table.lines)}
 
 
-def _read_probe(table: Table, robot: Actuated | None, offset: ArrayLike) -> Measurements:
+def _read_probe(table: Table, robot: Actuated | None, offset: ArrayLike | None) -> Measurements:
     """Heights of a probe's tip where it triggered: 0, on the bed."""
     what = "probe" if "probe" in table.columns else "contact"
     if not isinstance(robot, Robot):
@@ -247,8 +249,17 @@ def _read_probe(table: Table, robot: Actuated | None, offset: ArrayLike) -> Meas
             f"column {table.columns[what].name!r}: give the robot, as the firmware had it when"
             " it probed"
         )
+    try:
+        found = offset_of(robot, offset, "probe_offset")
+    except ValueError as error:
+        raise FileError(f"{table.path}: {error}") from None
+    shown = ", ".join(f"{value:g}" for value in found)
+    source = "the robot file" if offset is None else "--probe-offset"
+    used = f"its offset is {shown} mm, of {source}"
     if what == "contact":
-        return _read_contacts(table, robot, offset)
+        table.notes.append(f"the firmware says where the nozzle would touch the bed; {used}")
+        places = table.stacked(["x", "y", "contact"], ["mm", "mm", "mm"])
+        return _probed(table, robot, places - found * [1.0, 1.0, -1.0], found)
     z = table.numbers("probe", "mm")[0]
     if actuators_in(table):
         actuators, units = read_actuators(table, robot)
@@ -267,27 +278,12 @@ def _read_probe(table: Table, robot: Actuated | None, offset: ArrayLike) -> Meas
         poses = np.column_stack([table.stacked(["x", "y"], ["mm", "mm"]), z])
     table.notes.append(
         f"{table.columns['probe'].name!r} taken as the firmware's z when the probe triggered: the"
-        " actuators are those that the robot file has there, and the probe's tip is at 0"
+        f" actuators are those that the robot file has there, and the probe's tip is at 0; {used}"
     )
-    return _probed(table, robot, poses, offset)
+    return _probed(table, robot, poses, found)
 
 
-def _read_contacts(table: Table, robot: Robot, offset: ArrayLike) -> Measurements:
-    """Heights of a tip, where the firmware says where the nozzle would touch the bed."""
-    places = table.stacked(["x", "y", "contact"], ["mm", "mm", "mm"])
-    given, shape = as_rows("probe_offset", offset, 3)
-    if shape != () or not np.isfinite(given).all():
-        raise ArgumentError("probe_offset must be three finite numbers; found others")
-    shown = ", ".join(f"{value:g}" for value in given[0])
-    table.notes.append(
-        "the firmware says where the nozzle would touch the bed, by its offsets of the probe;"
-        f" they are taken as {shown} mm (--probe-offset, x_offset, y_offset and z_offset of its"
-        " configuration)"
-    )
-    return _probed(table, robot, places - given[0] * [1.0, 1.0, -1.0], offset)
-
-
-def _probed(table: Table, robot: Robot, points: FloatArray, offset: ArrayLike) -> Measurements:
+def _probed(table: Table, robot: Robot, points: FloatArray, offset: FloatArray) -> Measurements:
     try:
         measured = probed(robot, points, offset=offset)
         fields = _read_fields(table, measured.instrument, robot.actuator_units)

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from pkmcal.arguments import instance
 from pkmcal.arrays import FloatArray, as_rows, rms
 from pkmcal.exceptions import ArgumentError, CalibrationWarning
+from pkmcal.geometry.probe_offset import LOWEST, OTHER_SIGN
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
 
@@ -30,7 +31,7 @@ def probed(
     robot: Robot,
     points: ArrayLike,
     *,
-    offset: ArrayLike = (0.0, 0.0, 0.0),
+    offset: ArrayLike | None = None,
     sigma: ArrayLike | None = None,
 ) -> Measurements:
     """Measurements by a printer's probe: the points at which it triggered.
@@ -43,7 +44,7 @@ def probed(
         x, y and z of the nozzle as the firmware reported them when the probe triggered, mm.
     offset : (3,) array
         The firmware's offsets of the probe, mm: it touches at nozzle + (x, y), and the nozzle is
-        then z above the bed.
+        then z above the bed. By default that of the robot file, ``[probe] offset``.
     sigma : scalar or (N,) array, optional
         Standard deviation of the probe, mm.
 
@@ -55,13 +56,14 @@ def probed(
     Raises
     ------
     ValueError
-        A point that the robot cannot reach; a shape that does not fit.
+        A point that the robot cannot reach; a shape that does not fit; an offset that is stated
+        nowhere.
 
     Examples
     --------
     >>> import pkmcal as pk
     >>> printer = pk.load("linear-delta")
-    >>> m = pk.probed(printer, [[0, 0, 0.2], [50, 0, 0.1], [0, 50, 0.15]])
+    >>> m = pk.probed(printer, [[0, 0, 0.2], [50, 0, 0.1], [0, 50, 0.15]], offset=[0, 0, 0])
     >>> m.kind, m.values.tolist()
     ('height', [0.0, 0.0, 0.0])
     """
@@ -69,9 +71,7 @@ def probed(
     found, shape = as_rows("points", points, 3)
     if len(shape) != 1 or not len(found) or not np.isfinite(found).all():
         raise ArgumentError(f"points must be finite and have shape (N, 3); found {shape}")
-    place, one = as_rows("offset", offset, 3)
-    if one or not np.isfinite(place).all():
-        raise ArgumentError("offset must be three finite numbers: x, y and z of the probe")
+    place = offset_of(robot, offset, "offset")
     actuators = actuators_at(robot, found)
     if not np.isfinite(actuators).all():
         row = int(np.argmin(np.isfinite(actuators).all(axis=1)))
@@ -82,9 +82,34 @@ def probed(
         np.zeros(len(found)),
         "height",
         sigma=sigma,
-        target=place[0] * [1.0, 1.0, -1.0],
+        target=place * [1.0, 1.0, -1.0],
         actuator_units=robot.actuator_units,
     )
+
+
+def offset_of(robot: Robot, given: ArrayLike | None, argument: str) -> FloatArray:
+    """The probe's offset (3,), mm: as given, or of the robot file.
+
+    Raises
+    ------
+    ValueError
+        Neither is there, or it is no offset.
+    """
+    if given is None and robot.model.probe is not None:
+        return robot.model.probe
+    if given is None:
+        raise ArgumentError(
+            f"{argument} is stated nowhere: x, y and z of the probe from the nozzle, in mm"
+            " (--probe-offset X,Y,Z, or [probe] offset = {x = X, y = Y, z = Z} of the robot file);"
+            " 0,0,0 where the nozzle itself touches the bed"
+        )
+    found, shape = as_rows(argument, given, 3)
+    if shape or not np.isfinite(found).all():
+        raise ArgumentError(f"{argument} must be three finite numbers: x, y and z of the probe")
+    if found[0, 2] < LOWEST:
+        raise ArgumentError(f"{argument}: {OTHER_SIGN.format(z=found[0, 2])}")
+    place: FloatArray = found[0]
+    return place
 
 
 def actuators_at(robot: Robot, points: FloatArray) -> FloatArray:

@@ -190,10 +190,19 @@ class Between(Reading):
         return {"distance", *(f"to.{name}" for name in table.columns if name[:1] == "q")}
 
     def read(self, table: Table, units: Sequence[str]) -> Between:
-        """The actuators at the second place."""
-        return replace(
-            self, other=table.stacked([f"to.q{i + 1}" for i in range(len(units))], units)
-        )
+        """The actuators at the second place, in the units of those at the first; steps, too."""
+        names = [f"q{i + 1}" for i in range(len(units))]
+        table.require([f"to.{name}" for name in names])
+        columns = []
+        for name, unit in zip(names, units, strict=True):
+            second = f"to.{name}"
+            values, quantity = table.numbers(second, unit, "count", expected=unit)
+            _, of_first = table.numbers(name, unit, "count", expected=unit)
+            counts = [table.columns[each].unit for each in (name, second)]
+            if quantity != of_first or (quantity == "count" and counts[0] != counts[1]):
+                raise table.header_error(f"columns {name!r} and {second!r} have unlike units")
+            columns.append(values)
+        return replace(self, other=np.stack(columns, axis=1))
 
     def columns(self, units: Sequence[str]) -> Iterator[WrittenColumn]:
         """The actuators at the second place."""

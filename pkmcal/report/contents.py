@@ -80,6 +80,13 @@ def instrument_identified(found: Identification) -> bool:
     return len(found.free) > int(found.fit.parameters.geometry.stop)
 
 
+def export_command(found: Identification) -> str:
+    """What writes the calibrated machine for the firmware it was imported from; "" of others."""
+    if isinstance(found.robot, SerialArm) or found.robot.model.controller is None:
+        return ""
+    return found.robot.model.controller.command("robot.toml")
+
+
 def directions(found: Identification) -> list[dict[str, Any]]:
     """List mean, rms and largest residual of each component read, before and after; mm and rad."""
     names: dict[str, tuple[str, list[FloatArray], list[FloatArray]]] = {}

@@ -112,6 +112,7 @@ def gather(
         "inputs": checksums(files),
         "instrument_sought": contents.instrument_identified(found),
         "arm": isinstance(found.robot, SerialArm),
+        "export": contents.export_command(found),
         "version": version(),
     }
 

@@ -16,6 +16,7 @@ from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.model import Cone, Model
 from pkmcal.kinematics.dexterity import dexterity
 from pkmcal.kinematics.frames import NOWHERE
+from pkmcal.kinematics.reading_units import reading_units
 from pkmcal.kinematics.robot import Robot
 from pkmcal.screw import from_pose
 from pkmcal.view import chains, drives, memory, ranges, words
@@ -74,8 +75,10 @@ def data(robot: Robot, cloud: bool) -> dict[str, Any]:
         "poses": ranges.sliders(robot, spans, most),
         "reach": [list(ends) for ends in spans.values()],
         "actuators": [
-            {"unit": unit, "range": ends, "stroke": stroke}
-            for unit, ends, stroke in zip(robot.actuator_units, moves, strokes, strict=True)
+            {"unit": unit, "reading": reading, "range": ends, "stroke": stroke}
+            for unit, reading, ends, stroke in zip(
+                robot.actuator_units, reading_units(robot), moves, strokes, strict=True
+            )
         ],
         "turns": [_number(turn) for turn in machine.turns(slots).tolist()],
         "near": machine.reference(slots).tolist(),

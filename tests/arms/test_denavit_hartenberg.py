@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -127,6 +128,60 @@ def test_numbers_of_a_calibrated_arm_are_on_the_side_of_its_nominal_ones(seed: i
         turned = (table.theta[1:4].sum() + np.pi) % (2 * np.pi) - np.pi
         assert abs(turned) < 0.02
         assert np.abs(table.tool[:3, :3] - np.eye(3)).max() < 0.02
+
+
+def with_beta(table: pk.DHTable, kinds: Any, q: FloatArray) -> FloatArray:
+    """Rows with Hayati's parameter, multiplied out."""
+    assert table.beta is not None
+    tool = table.base
+    for i, kind in enumerate(kinds):
+        turn, slide = (q[i], 0.0) if kind == "revolute" else (0.0, q[i])
+        own = link("standard", 0, 0, table.d[i] + slide, table.theta[i] + turn)
+        across = link("standard", table.a[i], table.alpha[i], 0, 0)
+        c, s = np.cos(table.beta[i]), np.sin(table.beta[i])
+        across = across @ np.array([[c, 0, s, 0], [0, 1, 0, 0], [-s, 0, c, 0], [0, 0, 0, 1]])
+        tool = tool @ (own @ across if table.convention == "standard" else across @ own)
+    return tool @ table.tool
+
+
+@pytest.mark.parametrize("convention", ["standard", "modified"])
+@pytest.mark.parametrize("seed", range(20))
+def test_numbers_with_hayatis_parameter_are_of_the_size_of_the_arm(
+    convention: Any, seed: int
+) -> None:
+    """Parallel axes that errors lean by mrad and less, either way round, and others between."""
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(2, 8))
+    kinds = list(rng.choice(["revolute", "prismatic"], n, p=[0.8, 0.2]))
+    axes = np.repeat(np.eye(3)[rng.integers(0, 3, n)], 2, axis=0)[:n] * rng.choice([-1, 1], (n, 1))
+    points = rng.normal(size=(n, 3)) * 300
+    lean = 10.0 ** -rng.integers(3, 9)
+    errors = rng.normal(size=(n, 6)) * [1, 1, 1, lean, lean, lean]
+    home = [*rng.normal(size=3) * 300, *rng.normal(size=3) * (seed % 2)]
+    arm = pk.SerialArm(axes, points, home, kinds=kinds, joint_errors=errors)
+    table = arm.dh(convention, "hayati")
+    assert table.beta is not None and np.abs(table.beta).max() < 0.01
+    assert max(np.abs(table.a).max(), np.abs(table.d).max()) < 1e4
+    q = rng.normal(size=n)
+    np.testing.assert_allclose(with_beta(table, arm.kinds, q), arm.forward(q), atol=1e-7)
+
+
+def test_a_calibrated_arm_of_parallel_axes_has_numbers_to_type_in(tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    nominal = pk.SerialArm.from_dh(**UR10E)  # type: ignore[arg-type]
+    arm = nominal.replace(rng.normal(size=(6, 6)) * [0.2, 0.2, 0.2, 1e-5, 1e-5, 1e-5])
+    assert np.abs(arm.dh().d).max() > 1e4
+    table = pk.export.dh(arm, tmp_path / "dh.csv")
+    text = (tmp_path / "dh.csv").read_text()
+    assert "Rz(theta) Tz(d) Tx(a) Rx(alpha) Ry(beta) a row" in text and "beta [deg]" in text
+    for name in ("a", "d"):
+        np.testing.assert_allclose(getattr(table, name), UR10E[name], atol=3.0)
+    q = rng.uniform(-2, 2, 6)
+    np.testing.assert_allclose(with_beta(table, arm.kinds, q), arm.forward(q), atol=1e-7)
+    pk.export.dh(nominal, tmp_path / "nominal.csv")
+    assert "beta" not in (tmp_path / "nominal.csv").read_text()
+    far = pk.export.dh(arm, tmp_path / "far.csv", parallel="normal")
+    assert far.beta is None and "beta" not in (tmp_path / "far.csv").read_text()
 
 
 def test_an_arm_of_another_maker_is_no_universal_robot(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,12 @@ def delta() -> pk.Robot:
         limbs.append(
             {"base": robots.ring(160.0, angle), "rod": rod, "offset": offset, "gain": -1.0}
         )
-    return robots.linear_delta(*limbs)
+    return with_probe(robots.linear_delta(*limbs))
+
+
+def with_probe(robot: pk.Robot, x: float = 12.0, y: float = -7.0, z: float = 1.7) -> pk.Robot:
+    """With a bed probe that triggers when the nozzle is z above the bed."""
+    return pk.Robot(replace(robot.model, probe=np.array([x, y, z])))
 
 
 def words(text: str, command: str) -> dict[str, list[float]]:
@@ -60,6 +66,7 @@ def marlin_model(text: str, nozzle: Any) -> Any:
     """The same of Marlin: homing moves each carriage from its switch by its adjustment."""
     size, ends = words(text, "M665"), words(text, "M666")
     (rod,), (r,), (height,) = size["L"], size["R"], size["H"]
+    height -= words(text, "M851")["Z"][0]  # set_axis_is_at_home(), where there is a bed probe
     arms = rod + np.array([size[letter][0] for letter in "ABC"])
     adjustment = np.array([ends[letter][0] for letter in "XYZ"])
     assert adjustment.max() <= 0.0  # it cannot go beyond the switch
@@ -144,7 +151,9 @@ def test_users_config_is_kept_but_for_changed_numbers(run: Any, tmp_path: Path) 
 
 def test_lines_are_found_as_firmwares_print_them(tmp_path: Path) -> None:
     """Marlin's M503 and a commented config.g; the last command counts, one rod stands for three."""
-    (tmp_path / "m503").write_text("echo:  M665 L250.00 R125.00 H300.00 X0.5\necho:  M666 X-0.20\n")
+    (tmp_path / "m503").write_text(
+        "echo:  M665 L250.00 R125.00 H300.00 X0.5\necho:  M666 X-0.20\necho:  M851 Z0\n"
+    )
     g = pk.import_printer(tmp_path / "m503", "marlin").robot.geometry
     assert (g["rod2"], g["radius"]) == (250.0, 125.0)
     assert g["offset1"] - g["offset2"] == pytest.approx(0.2, abs=1e-12)
@@ -184,7 +193,7 @@ def test_a_rod_among_three_that_is_no_number_is_named(tmp_path: Path) -> None:
     ],
 )
 def test_mistakes_are_named(text: str, message: str, tmp_path: Path) -> None:
-    (tmp_path / "config.g").write_text(text)
+    (tmp_path / "config.g").write_text(text + "M851 Z0\n")
     for firmware in ("reprap", "marlin"):
         with pytest.raises(pk.FileError, match=message):
             pk.import_printer(tmp_path / "config.g", firmware)  # type: ignore[arg-type]
@@ -206,7 +215,8 @@ def test_mistakes_are_named(text: str, message: str, tmp_path: Path) -> None:
 def test_settings_are_found_however_they_are_written(
     text: str, firmware: str, tmp_path: Path
 ) -> None:
-    (tmp_path / "config.g").write_bytes(b"; D\xfcse\n"[: 9 * (text[0] != "\ufeff")] + text.encode())
+    head = b"; D\xfcse\n"[: 9 * (text[0] != "\ufeff")]
+    (tmp_path / "config.g").write_bytes(head + f"{text}M851 Z0\n".encode())
     g = pk.import_printer(tmp_path / "config.g", firmware).robot.geometry  # type: ignore[arg-type]
     assert (g["rod1"], g["radius"]) == (250.0, 125.0)
     assert np.degrees(g["angle1"]) == pytest.approx(210.5)
@@ -223,7 +233,13 @@ def test_what_a_robot_file_cannot_hold_is_no_silent_zero(tmp_path: Path) -> None
             "B of M666 tilts the bed by -1.5 %",
         ),
         ("marlin", "G20\nM665 L10 R5 H12\nM666 X0\n", "G20: the numbers are in inches"),
-        ("marlin", "M665 L250 R125 H300\nM666 X0.2\n", "must not be above 0, found 0.2"),
+        ("marlin", "M665 L250 R125 H300\nM666 X0.2\nM851 Z0\n", "must not be above 0, found 0.2"),
+        (
+            "marlin",
+            "M665 L250 R125 H300\nM666 X0\n",
+            "M851 is missing: with a bed probe",
+        ),
+        ("marlin", "M665 L250 R125 H300\nM666 X0\nM851 X1\n", "Z of M851 is missing"),
         (
             "reprap",
             "M665 L250 R125 H100000000000000000000\nM666 X0\n",

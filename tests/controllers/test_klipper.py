@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -102,7 +103,11 @@ def test_what_the_firmware_reads_is_what_is_imported(tmp_path: Path) -> None:
     assert printer.measurements is not None and printer.measurements.kind == "height"
     np.testing.assert_array_equal(printer.measurements.values, [1.25, -0.1])
     np.testing.assert_array_equal(printer.measurements.actuators[0], [1000.5, 2000.25, 3000.0])
-    assert printer.distances == 1 and "1 distances" in str(printer)
+    assert printer.distances is not None and printer.distances.kind == "between"
+    np.testing.assert_array_equal(printer.distances.actuators, [[1.0, 2.0, 3.0]])
+    np.testing.assert_array_equal(printer.distances.other, [[4.0, 5.0, 6.0]])
+    assert printer.distances.values.tolist() == [65.5]
+    assert "1 distance of a printed part" in str(printer) and "rod1" in printer.robot.model.free
 
 
 def test_imported_printer_goes_where_the_firmware_goes(tmp_path: Path) -> None:
@@ -231,6 +236,59 @@ def test_a_saved_block_that_the_firmware_leaves_out_is_not_read(tmp_path: Path) 
         pk.import_printer(own(tmp_path, text))
 
 
+HEADER = "#*# <---------------------- SAVE_CONFIG ---------------------->"
+
+
+def klippers_own(text: str) -> str:
+    """The saved block as Klipper's _find_autosave_data() finds it; "" where it does not."""
+    header = f"\n{HEADER}\n#*# DO NOT EDIT THIS BLOCK OR BELOW. The contents are auto-generated.\n"
+    above, found, block = text.replace("\r\n", "\n").partition(header + "#*#\n")
+    if not found or "\n#*# " in above or header in block:
+        return ""
+    lines = block.strip().split("\n")
+    return block if all(line == "#*#" or line.startswith("#*# ") for line in lines) else ""
+
+
+@pytest.mark.parametrize("newline", ["\n", "\r\n"])
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("# mine", "# mine\n#*# old", "line 2: begins with '#\\*# ' above SAVE_CONFIG"),
+        ("# mine", "#*# mine", ""),  # the firmware looks behind line ends
+        ("# mine", "# mine\n#*#", ""),
+        ("# mine", "# mine\n #*# in", ""),
+        (
+            HEADER,
+            HEADER.replace("--- S", "-- S"),
+            "line 24: the three lines of SAVE_CONFIG's header",
+        ),
+        (HEADER, HEADER + " ", "line 24: the three lines of SAVE_CONFIG's header"),
+        ("auto-generated.", "auto-generated", "line 24: the three lines of SAVE_CONFIG's header"),
+        (
+            "generated.\n#*#\n",
+            "generated.\n#*# \n",
+            "line 24: the three lines of SAVE_CONFIG's header",
+        ),
+        ("generated.\n#*#\n", "generated.\n", "line 24: the three lines of SAVE_CONFIG's header"),
+        ("#*# [stepper_a]", HEADER + "\n#*# [stepper_a]", "line 30: behind SAVE_CONFIG"),
+        ("#*# [stepper_a]", "[stepper_a]", "line 30: behind SAVE_CONFIG"),
+    ],
+)
+def test_a_saved_block_counts_where_the_firmware_takes_it(
+    old: str, new: str, message: str, newline: str, tmp_path: Path
+) -> None:
+    text = OWN.replace(old, new, 1).replace("\n", newline)
+    assert text != OWN.replace("\n", newline)
+    (tmp_path / "mine.cfg").write_bytes(text.encode())
+    if message:
+        with pytest.raises(pk.FileError, match=message):
+            pk.import_printer(tmp_path / "mine.cfg")
+    else:
+        assert klippers_own(text) and pk.import_printer(tmp_path / "mine.cfg").measurements
+    if not new.startswith(HEADER + "\n"):  # that is no line of any section, and refused as such
+        assert bool(klippers_own(text)) is not bool(message)
+
+
 def test_comments_stay_and_a_gain_becomes_a_rotation_distance(tmp_path: Path) -> None:
     file = own(tmp_path)
     robot = pk.import_printer(file).robot
@@ -328,22 +386,31 @@ def test_mistakes_are_named_with_their_line(
     assert message in str(caught.value)
 
 
+def stored(log: dict[str, Any], longer: float) -> str:
+    """A printer.cfg with what is measured in a log, and with numbers that are off."""
+    text = f"[printer]\nkinematics: delta\ndelta_radius: {log['radius'] + 1.5}\n"
+    for i, axis in enumerate("abc"):
+        text += f"[stepper_{axis}]\nrotation_distance: {log['stepdist'][i] * 3200!r}\n"
+        text += f"microsteps: 16\narm_length: {log['arm_length'][i] + longer * i}\n"
+        text += f"angle: {log['angle'][i] + 0.3 * (i - 2)}\n"
+        text += f"position_endstop: {log['position_endstop'][i] - 1 + i}\n"
+    text += "[delta_calibrate]\n"
+    for i, (height, pos) in enumerate(zip(log["height"], log["pos"], strict=True)):
+        text += f"height{i}: {height}\nheight{i}_pos: {','.join(map(str, pos))}\n"
+    for i, (distance, *ends) in enumerate(log.get("distance") or []):
+        text += f"distance{i}: {distance}\n"
+        for end, pos in enumerate(ends, 1):
+            text += f"distance{i}_pos{end}: {','.join(map(str, pos))}\n"
+    return text
+
+
 @pytest.mark.skipif(not LOGS.exists(), reason=f"{LOGS} is not here")
 def test_real_logs_lead_to_what_the_firmware_found(tmp_path: Path) -> None:
     """Four printers: from numbers that are off, the stored heights lead to the saved ones."""
     logs = [log for log in json.loads(LOGS.read_text()) if not log.get("distance")]
     assert logs
     for log in logs:
-        text = f"[printer]\nkinematics: delta\ndelta_radius: {log['radius'] + 1.5}\n"
-        for i, axis in enumerate("abc"):
-            text += f"[stepper_{axis}]\nrotation_distance: {log['stepdist'][i] * 3200!r}\n"
-            text += f"microsteps: 16\narm_length: {log['arm_length'][i]}\n"
-            text += f"angle: {log['angle'][i] + 0.3 * (i - 2)}\n"
-            text += f"position_endstop: {log['position_endstop'][i] - 1 + i}\n"
-        text += "[delta_calibrate]\n"
-        for i, (height, pos) in enumerate(zip(log["height"], log["pos"], strict=True)):
-            text += f"height{i}: {height}\nheight{i}_pos: {','.join(map(str, pos))}\n"
-        file = own(tmp_path, text)
+        file = own(tmp_path, stored(log, 0.0))
         printer = pk.import_printer(file)
         assert printer.measurements is not None
         found = pk.identify(printer.robot, printer.measurements)
@@ -359,6 +426,37 @@ def test_real_logs_lead_to_what_the_firmware_found(tmp_path: Path) -> None:
         endstops, saved = written("position_endstop"), np.array(log["position_endstop"])
         shift = endstops - saved  # of all three alike: the first layer, set by hand afterwards
         assert abs(shift).max() < 0.1
+        np.testing.assert_allclose(shift, shift.mean(), rtol=0, atol=1e-3)
+
+
+@pytest.mark.skipif(not LOGS.exists(), reason=f"{LOGS} is not here")
+def test_distances_of_a_print_lead_to_the_nine_numbers_the_firmware_found(
+    run: Any, tmp_path: Path
+) -> None:
+    """From rods and all that are off, through files in steps, with the firmware's own weights.
+
+    calculate_params() of Klipper's delta_calibrate.py weighs heights by 2 n_distances / n_heights.
+    """
+    logs = [log for log in json.loads(LOGS.read_text()) if log.get("distance")]
+    assert len(logs) == 2
+    for log in logs:
+        out = tmp_path / str(log["printer"]).replace(" ", "")
+        assert run("import", own(tmp_path, stored(log, 0.5)), "--out", out).exit_code == 0
+        robot = pk.load(out / "robot.toml")
+        assert {"rod1", "rod2", "rod3"} < set(robot.model.free)
+        heights = pk.read_measurements(out / "probe.csv", robot)
+        distances = pk.read_measurements(out / "distances.csv", robot)
+        assert (len(heights), len(distances), distances.kind) == (7, 12, "between")
+        weight = 2.0 * len(distances) / len(heights)
+        both = [replace(heights, sigma=0.2 / weight**0.5), replace(distances, sigma=0.2)]
+        g = pk.identify(robot, both).robot.geometry
+        np.testing.assert_allclose([g[f"rod{i}"] for i in (1, 2, 3)], log["arm_length"], atol=1e-3)
+        assert g["radius"] == pytest.approx(log["radius"], abs=1e-3)
+        angles = np.degrees([g[f"angle{i}"] for i in (1, 2, 3)])
+        np.testing.assert_allclose(angles, log["angle"], atol=1e-3)
+        carriages = [in_the_middle(g["radius"], g[f"rod{i}"], 0.0) for i in (1, 2, 3)]
+        shift = [g[f"offset{i}"] for i in (1, 2, 3)] - np.add(carriages, log["position_endstop"])
+        assert abs(shift).max() < 0.3  # of all three alike: the first layer, set by hand
         np.testing.assert_allclose(shift, shift.mean(), rtol=0, atol=1e-3)
 
 

@@ -186,8 +186,7 @@ def _console(text: str) -> Iterator[str]:
         if command.startswith(("pkmcal", "make")):
             result = run(as_pkmcal(pipe[1] if pipe else command))
             assert result.exit_code in (0, 1), (command, result.exit_code, result.output)
-            assert result.stderr == "", (command, result.stderr)
-            printed = result.stdout
+            printed = result.stderr + result.stdout  # as a terminal shows them
             if pipe:
                 printed = "".join(printed.splitlines(keepends=True)[: int(pipe[2])])
         else:

@@ -256,6 +256,15 @@ def test_a_spreadsheet_in_german_with_titles_and_units_below(tmp_path: Path) -> 
     np.testing.assert_array_equal(m.actuators, TRUTH.actuators)
 
 
+@pytest.mark.parametrize(
+    "name", ["Cable {}", "Winch {}", "winch_{}", "Belt{}", "Rope {}", "Seil {}", "Winch {} length"]
+)
+def test_cables_and_what_winds_them_are_actuators(name: str, tmp_path: Path) -> None:
+    heads = ",".join(f"{name.format(i)} [mm]" for i in (1, 2, 3))
+    m = read(tmp_path, f"{heads},z [mm]\n1,2,3,4\n")
+    assert m.actuators.tolist() == [[1.0, 2.0, 3.0]] and m.values.tolist() == [4.0]
+
+
 def test_a_heading_that_comes_once_more_is_left_out_and_said(tmp_path: Path) -> None:
     m = read(tmp_path, "q1 [mm],z [mm]\n1,2\nq1 [mm],z [mm]\n3,4\n")
     assert len(m) == 2 and "once more in line 3, left out" in m.notes[0]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ TRUE = FIRMWARE.replace({
 })  # fmt: skip
 GRID = [(x, y) for x in range(-80, 81, 40) for y in range(-80, 81, 40) if x * x + y * y < 1e4]
 OFFSET = np.array([12.0, -7.0, 1.5])
+ITSELF = np.zeros(3)  # the nozzle is the probe
 
 
 def nozzle(robot: pk.Robot, q: FloatArray) -> FloatArray:
@@ -66,10 +68,12 @@ def test_the_lines_of_a_log_are_read_as_they_stand(tmp_path: Path) -> None:
     path = tmp_path / "klippy.log"
     lines = [f"// probe at {x:.3f},{y:.3f} is z={z:.6f}" for x, y, z in points]
     path.write_text("Send: PROBE\n" + "\necho: something\n".join(lines))
-    m = pk.read_measurements(path, FIRMWARE)
-    np.testing.assert_allclose(m.actuators, pk.probed(FIRMWARE, points).actuators, atol=1e-5)
+    m = pk.read_measurements(path, FIRMWARE, probe_offset=ITSELF)
+    expected = pk.probed(FIRMWARE, points, offset=ITSELF).actuators
+    np.testing.assert_allclose(m.actuators, expected, atol=1e-5)
     path.write_text("\n".join(f"Bed X: {x:.3f} Y: {y:.3f} Z: {z:.6f}" for x, y, z in points))
-    np.testing.assert_array_equal(pk.read_measurements(path, FIRMWARE).actuators, m.actuators)
+    again = pk.read_measurements(path, FIRMWARE, probe_offset=ITSELF)
+    np.testing.assert_array_equal(again.actuators, m.actuators)
 
 
 def test_actuators_beside_a_probe_have_to_be_those_of_the_trigger(tmp_path: Path) -> None:
@@ -78,12 +82,12 @@ def test_actuators_beside_a_probe_have_to_be_those_of_the_trigger(tmp_path: Path
     heads = "q1 [mm],q2 [mm],q3 [mm],probe [mm]"
     poses = np.column_stack([points, np.zeros_like(points)])
     right = np.column_stack([FIRMWARE.inverse(poses), points[:, 2]])
-    m = pk.read_measurements(file(tmp_path, heads, right), FIRMWARE)
+    m = pk.read_measurements(file(tmp_path, heads, right), FIRMWARE, probe_offset=ITSELF)
     assert off(pk.identify(FIRMWARE, m)) < 1e-3
     flat = poses * [1, 1, 0, 1, 1, 1]
     wrong = np.column_stack([FIRMWARE.inverse(flat), points[:, 2]])
     with pytest.raises(pk.FileError, match="have to be those at which the probe triggered"):
-        pk.read_measurements(file(tmp_path, heads, wrong), FIRMWARE)
+        pk.read_measurements(file(tmp_path, heads, wrong), FIRMWARE, probe_offset=ITSELF)
 
 
 def test_heights_that_the_robot_file_gives_itself_are_warned_of(tmp_path: Path) -> None:
@@ -111,9 +115,26 @@ def test_a_probe_without_its_machine_is_refused(tmp_path: Path) -> None:
     with pytest.raises(pk.FileError, match="give the robot, as the firmware had it"):
         pk.read_measurements(path)
     with pytest.raises(pk.ArgumentError, match="does not reach"):
-        pk.probed(FIRMWARE, [[0, 0, 0], [1000, 0, 0]])
+        pk.probed(FIRMWARE, [[0, 0, 0], [1000, 0, 0]], offset=ITSELF)
     with pytest.raises(pk.ArgumentError, match="offset must"):
         pk.probed(FIRMWARE, [[0, 0, 0]], offset=[1, 2])
+
+
+@pytest.mark.parametrize("line", ["// probe at 0,0 is z=0.1", "Bed X: 0 Y: 0 Z: 0.1"])
+def test_an_offset_that_is_stated_nowhere_is_asked_for(line: str, tmp_path: Path) -> None:
+    """Taken as 0 it would move the end stops by the height at which the probe triggers."""
+    path = tmp_path / "log.txt"
+    path.write_text(line)
+    for read in (
+        lambda robot: pk.read_measurements(path, robot),
+        lambda robot: pk.probed(robot, [[0, 0, 0.1]]),
+    ):
+        with pytest.raises(pk.Error, match=r"offset is stated nowhere: .*--probe-offset X,Y,Z"):
+            read(FIRMWARE)
+        stated = pk.Robot(replace(FIRMWARE.model, probe=OFFSET))
+        np.testing.assert_allclose(read(stated).targets[0], [12.0, -7.0, -1.5])
+    with pytest.raises(pk.Error, match=r"found -1\.7 mm; it is -Z of Marlin's M851"):
+        pk.read_measurements(path, FIRMWARE, probe_offset=[0, 0, -1.7])
 
 
 def test_heights_that_a_file_was_calibrated_with_are_not_warned_of(tmp_path: Path) -> None:
@@ -133,11 +154,15 @@ def test_where_the_nozzle_would_touch_is_where_the_probe_triggered(tmp_path: Pat
     m = pk.read_measurements(path, FIRMWARE, probe_offset=OFFSET)
     beds = points + OFFSET * [1, 1, -1]
     new = [f"// probe: at {x:.3f},{y:.3f} bed will contact at z={z:.6f}" for x, y, z in beds]
-    path.write_text("\n".join(["// Result: at 1.000,2.000 estimate contact at z=3.000000", *new]))
-    again = pk.read_measurements(path, FIRMWARE, probe_offset=OFFSET)
-    np.testing.assert_allclose(again.actuators, m.actuators, atol=1e-5)
-    np.testing.assert_allclose(again.targets, m.targets)
-    assert "--probe-offset" in again.notes[-1] and off(pk.identify(FIRMWARE, again)) < 1e-3
+    result = ["// Result: at 1.000,2.000 estimate contact at z=3.000000", *new]
+    marlin = [f"Bed X: {x:.3f} Y: {y:.3f} Z: {z:.6f}" for x, y, z in beds]
+    for lines in (marlin, result):
+        path.write_text("\n".join(lines))
+        again = pk.read_measurements(path, FIRMWARE, probe_offset=OFFSET)
+        np.testing.assert_allclose(again.actuators, m.actuators, atol=1e-5)
+        np.testing.assert_allclose(again.targets, m.targets)
+        assert "12, -7, 1.5 mm, of --probe-offset" in again.notes[-1]
+    assert off(pk.identify(FIRMWARE, again)) < 1e-3
     path.write_text("\n".join(old + new))
     with pytest.raises(pk.FileError, match="in another way than in line 1: make two files"):
         pk.read_measurements(path, FIRMWARE)

@@ -19,7 +19,7 @@ function made(tag, parent, settings = {}, ...children) {
   return element
 }
 
-// A slider with a number beside it, in mm or degrees; `allowed` is drawn under it.
+// A slider with a number beside it, in mm, degrees or counts of a motor; `allowed` is drawn under it.
 function slider(parent, { name, title, unit, range, allowed, disabled, moved }) {
   const by = unit === 'rad' ? 1 / DEGREE : 1, shown = range.map(x => x * by)
   const label = made('label', parent, { className: 'row', title })
@@ -28,7 +28,7 @@ function slider(parent, { name, title, unit, range, allowed, disabled, moved }) 
   const track = made('span', label, { className: 'track' })
   const input = made('input', track, { type: 'range', ...settings })
   const number = made('input', label, { type: 'number', step: unit === 'rad' ? 1 : 5, 'aria-label': title })
-  made('span', label, { className: 'unit', text: unit === 'rad' ? '°' : 'mm' })
+  made('span', label, { className: 'unit', text: unit === 'rad' ? '°' : unit })
   if (allowed) {
     const [low, high] = allowed.map(x => (100 * (x * by - shown[0])) / (shown[1] - shown[0]))
     const shaded = made('i', track)
@@ -82,8 +82,8 @@ class Panel {
     made('h3', side, { text: arm ? (slides ? 'Move the joints' : 'Turn the joints') : surplus ? 'Actuators' : 'Move the actuators' })
     const what = arm ? 'The tool follows' : surplus ? 'There are more of them than ways to move: none moves alone, all follow' : 'The platform follows'
     made('p', side, { className: 'hint', text: `${what}${stated ? `; shaded: ${arm ? 'within its limits' : 'the stroke'}` : ''}.` })
-    this.q = actuators.map(({ unit, range, stroke }, a) => slider(side, {
-      name: `q${a + 1}`, title: joints?.[a].name ?? `actuator ${a + 1}`, unit, range, allowed: stroke, disabled: surplus,
+    this.q = actuators.map(({ unit, reading, range, stroke }, a) => slider(side, {
+      name: `q${a + 1}`, title: joints?.[a].name ?? `actuator ${a + 1}`, unit: reading ?? unit, range, allowed: stroke, disabled: surplus,
       moved: value => { this.mover.moveActuator(a, value); this.changed() },
     }))
   }

@@ -1,0 +1,47 @@
+"""The firmware from which a robot's numbers came, and to which they go: `[controller]`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from shlex import quote
+
+from pkmcal.files.toml_table import Table
+
+FIRMWARES = ("klipper", "reprap", "marlin", "hangprinter", "maslow")
+
+
+@dataclass(frozen=True)
+class Controller:
+    """What a robot file says of its controller.
+
+    Attributes
+    ----------
+    firmware : str
+        One of `FIRMWARES`.
+    file : str
+        Name of the configuration into which numbers are written; "" where they are entered.
+    """
+
+    firmware: str
+    file: str = ""
+
+    def command(self, robot: str) -> str:
+        """What writes a robot file for it, on the command line."""
+        config = f" --config {quote(self.file)}" if self.file else ""
+        suffix = Path(self.file).suffix or ".g"
+        return f"pkmcal export {quote(robot)} --as {self.firmware}{config} --out new{suffix}"
+
+
+def read_controller(table: Table) -> Controller:
+    """What a table ``[controller]`` says."""
+    table.only(("firmware", "file"))
+    firmware = table.choice("firmware", FIRMWARES, "firmware")
+    return Controller(firmware, table.text("file") if "file" in table else "")
+
+
+def controller_table(controller: Controller) -> dict[str, str]:
+    """The table of it."""
+    return {"firmware": controller.firmware} | (
+        {"file": controller.file} if controller.file else {}
+    )
