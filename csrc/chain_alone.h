@@ -122,8 +122,8 @@ SHARED mask chain_reclose(const pkm_chains *machine, int l, const chain_numbers 
 }
 
 /* Every chain alone, and the mean of what they share. Where the actuators are not given, with `missed`
- * NULL, they follow, into `drive`, but those of the tail, which are. Else `nearly` is that of chain_reclose, and what chains miss is told
- * that reach every pose. */
+ * NULL, they follow, into `drive`, but those of the tail, which are. Else `nearly` is that of
+ * chain_reclose, and `missed` is what all chains miss, or without it those that reach every pose. */
 SHARED mask chains_assembled(const pkm_chains *machine, const chain_numbers *numbers, const real *R,
                              const real *p, real *missed, int nearly, real *theta, real *drive)
 {
@@ -144,7 +144,7 @@ SHARED mask chains_assembled(const pkm_chains *machine, const chain_numbers *num
         const mask settled = chain_assemble(machine, l, numbers, R, p, NULL, MAX_ASSEMBLY, theta, own);
         if (!missed) good &= settled;
         else good &= chain_reclose(machine, l, numbers, R, p, drive, nearly, theta, &misses);
-        if (missed && k >= rows) *missed = larger(*missed, misses);
+        if (missed && (nearly || k >= rows)) *missed = larger(*missed, misses);
         for (int j = machine->first[l]; j < machine->first[l + 1]; j++) {
             const int joint = machine->member[j], a = machine->actuator[joint];
             const int c = machine->coordinate[joint];

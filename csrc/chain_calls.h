@@ -19,7 +19,9 @@ INLINE void chain_prepare(const chain_geometry *of, ptrdiff_t first, const ptrdi
 
 #define AT_HOME 0.1  /* rad, of the length: passive joints so near those of home are of its posture */
 #define POSTURE 2e-4 /* of the size: actuators that are farther from those of a posture may be another's */
-#define LIKELY 0.2   /* of that way: what the other then misses at most */
+#define LIKELY 0.2   /* of that way: what the other then misses at most, where the way is wide, */
+#define WIDE 0.1     /* of the size; less in proportion where it is shorter, for errors of the geometry
+                        move actuators too, and a universal joint turned over may miss less by chance */
 
 /* How far passive joints are from home, and drives from those asked for, mm. */
 INLINE void chain_way(const pkm_chains *machine, const real *theta, const real *from, const real *to,
@@ -98,7 +100,8 @@ SHARED mask chain_guess(const pkm_chains *machine, const chain_numbers *numbers,
         memcpy(drive, to, sizeof(real) * machine->actuators);
         start->second = *at;
         chains_assembled(machine, numbers, R, p, &missed, 1, start->second.theta, drive);
-        start->likely = start->doubt & (missed <= LIKELY * way);
+        const real wide = larger(way, fill(WIDE * machine->size));
+        start->likely = start->doubt & (missed * wide <= LIKELY * way * way);
         chain_choose(machine, other & far & ~good, start->second.theta, to, at->theta, start->from);
     }
     for (int c = 0; c < machine->passive; c++)
