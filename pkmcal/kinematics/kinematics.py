@@ -156,6 +156,10 @@ class Kinematics:
     ) -> FloatArray:
         """Actuator coordinates of a pose, limb by limb in closed form.
 
+        Limb by limb means: a machine of fewer than six degrees of freedom gets coordinates for a pose
+        that it cannot take, and then goes elsewhere. `violation` says what its closures miss there;
+        with `match` the pose is completed first to one that it takes.
+
         Parameters
         ----------
         pose : array_like (..., 6)
