@@ -19,7 +19,12 @@ from pkmcal.core.pulleys import PulleyMachine
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.model import CHAIN, Model
-from pkmcal.kinematics.complete import Completed, complete, matched_coordinates
+from pkmcal.kinematics.complete import (
+    Completed,
+    complete,
+    in_working_mode,
+    matched_coordinates,
+)
 from pkmcal.kinematics.forward import Forward
 from pkmcal.kinematics.frames import Frames
 from pkmcal.kinematics.limits import kept, margin_of
@@ -62,6 +67,8 @@ class Kinematics:
         self.frames = Frames(model.base_frame, model.tool_frame)
         self.machine = machine_of(model, self.slots, self.length)
         self.own_home = self.on_map(np.array(model.home, dtype=np.float64)[None])[0].copy()
+        for kept_array in (self.slots, self.own_home):
+            kept_array.setflags(write=False)
 
     @property
     def limb_machine(self) -> Machine | DrivenMachine:
@@ -482,6 +489,15 @@ class Kinematics:
         if q is None:
             q = self.machine.inverse(self.slots, self.on_map(own))
         return self.machine.closure(self.slots, own, q).by_step
+
+    def in_working_mode(self, own: FloatArray, q: FloatArray) -> BoolArray:
+        """Whether limbs are on the branches of the file at own poses (N, 6) and q (N, n).
+
+        Chains, which the inverse has in the posture that is reached from home, count as if they were.
+        """
+        if self.model.chains is not None:
+            return np.ones(len(q), dtype=bool)
+        return in_working_mode(self.machine, self.slots, own, q)
 
     def on_map(self, own: FloatArray) -> FloatArray:
         """Own poses (N, 6) as the pose map has them: what it does not move is not looked at."""
