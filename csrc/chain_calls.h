@@ -238,6 +238,18 @@ SHARED void chain_settle_doubt(const pkm_chains *machine, const chain_numbers *n
     chain_solve_again(machine, numbers, &start->at, &home.at, home.from, drive, lost, found);
 }
 
+/* Are the drives such as a machine can be at? Angles beyond these have lost digits, and so have their
+ * turns. */
+INLINE mask chain_within(const pkm_chains *machine, const real *drive)
+{
+    mask within = fill_mask(-1);
+    for (int j = 0; j < machine->joints; j++) {
+        const double most = machine->prismatic[j] ? 1e30 : MAX_ANGLE;
+        if (machine->actuator[j] >= 0) within &= absolute(drive[machine->actuator[j]]) <= fill(most);
+    }
+    return within;
+}
+
 int CALL(chain_forward)(const pkm_chains *machine, ptrdiff_t n, const double *geometry,
                         ptrdiff_t geometry_stride, const double *q, const double *guess,
                         ptrdiff_t guess_stride, double *pose, int32_t *status, int32_t *iterations,
@@ -263,15 +275,18 @@ int CALL(chain_forward)(const pkm_chains *machine, ptrdiff_t n, const double *ge
             own = any(chain_guess(machine, &numbers, begin, drive, &start));
             chain_predict(machine, &numbers, &start.at, start.from, &predicted);
         }
+        const mask within = chain_within(machine, drive);
         chain_unwind(machine, start.from, drive);
-        for (int a = 0; a < machine->actuators; a++) valid &= finite(drive[a]) & finite(lane_q[a]);
+        for (int a = 0; a < machine->actuators; a++) valid &= finite(lane_q[a]);
         for (int k = 0; k < 6; k++) valid &= finite(begin[k]);
         for (int k = 0; geometry_stride && k < machine->numbers; k++)
             valid &= finite(gather(geometry + k, geometry_stride, row));
-        chain_solve(machine, &numbers, &start.at, &predicted, start.from, drive, valid, &answer.at,
+        const mask usable = valid & within;
+        chain_solve(machine, &numbers, &start.at, &predicted, start.from, drive, usable, &answer.at,
                     &answer.status, &answer.iterations, &answer.residual);
-        chain_settle_doubt(machine, &numbers, &start, drive, valid, &answer);
-        const mask how = select_mask(valid, answer.status, fill_mask(PKM_INVALID));
+        chain_settle_doubt(machine, &numbers, &start, drive, usable, &answer);
+        mask how = select_mask(within, answer.status, fill_mask(PKM_INFEASIBLE));
+        how = select_mask(valid, how, fill_mask(PKM_INVALID));
         const mask good = how == fill_mask(PKM_OK), closest = good | (how == fill_mask(PKM_NOT_CLOSED));
         map_to_pose(machine->map, answer.at.state, found);
         for (int k = 0; k < 6; k++) found[k] = select(good, found[k], fill(NAN));

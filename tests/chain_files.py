@@ -229,7 +229,7 @@ def _direction(rng: np.random.Generator, way: FloatArray) -> FloatArray:
 
 
 def delta_of_hinges(angles: tuple[float, ...]) -> str:
-    """An H4: four vertical carriages of two rods each; two hinges of the platform, for four rods each."""
+    """An H4: four vertical carriages of two rods each, two hinges for four rods each."""
     radius, end, height, apart = 220.0, 50.0, -400.0, 25.0
     lines = [
         'name = "H4"\nunits = { length = "mm", angle = "rad" }\n[pose]\nmap = "spatial"',

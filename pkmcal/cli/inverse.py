@@ -44,11 +44,11 @@ def inverse(
 ) -> int:
     """Print the actuator coordinates that lead to poses.
 
-    Of a pose that the limbs do not allow the machine keeps as many coordinates as it can move, those
-    that its file declares, and the others follow.
+    Of a pose that the limbs do not allow the machine keeps as many coordinates as it can move,
+    those that its file declares, and the others follow.
 
-    Exit code 1: no pose keeps these coordinates, the closures miss a pose, a limb cannot reach it, or
-    breaks a limit there.
+    Exit code 1: no pose keeps these coordinates, the closures miss a pose, a limb cannot reach it,
+    or breaks a limit there.
 
     Example: pkmcal inverse hexapod 20,-10,860,5,0,3
     """

@@ -111,10 +111,10 @@ def _require(robot: Robot) -> None:
 
 
 def _closed_home(robot: Robot) -> tuple[FloatArray, FloatArray]:
-    """The own pose (6,) beside home at which all limbs close, and where they are driven to (limbs,).
+    """The own pose (6,) beside home at which all limbs close, and their drives there (limbs,).
 
-    The file's home is that of the machine without errors. Links that are taken there point where they
-    cannot with errors, and limbs that share an actuator ask for different coordinates.
+    The file's home is that of the machine without errors. Links that are taken there point where
+    they cannot with errors, and limbs that share an actuator ask for different coordinates.
     """
     q = robot.inverse(robot.home)[None]
     found = robot.forward(q)

@@ -83,11 +83,12 @@ class Forward(RowResult):
     def same_side(self) -> BoolArray:
         """Whether no singularity must lie between the guess and the pose (...).
 
-        Computed when asked for: the determinant has the sign it has at the guess, with the actuators
-        that lead there, and each limb in closed form is on the branch that its file states, as at the
-        guess. False means that the pose is another assembly mode than the guess's, with a singularity
-        between. True where it is unknown: with more closures than free coordinates, and where a limb
-        does not reach the guess. Modes with one sign and the same branches are not told apart.
+        Computed when asked for: the determinant has the sign it has at the guess, with the
+        actuators that lead there, and each limb in closed form is on the branch that its file
+        states, as at the guess. False means that the pose is another assembly mode than the
+        guess's, with a singularity between. True where it is unknown: with more closures than free
+        coordinates, and where a limb does not reach the guess. Modes with one sign and the same
+        branches are not told apart.
         """
         steps = self._closure_by_twist(self._own)
         if steps.shape[-2] != steps.shape[-1]:

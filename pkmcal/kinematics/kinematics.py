@@ -90,6 +90,18 @@ class Kinematics:
         return home
 
     @property
+    def home_actuators(self) -> FloatArray:
+        """Actuator coordinates (n,) at home; NaN where a limb does not reach it.
+
+        The inverse of home, or, where chains are singular there and it finds nothing, what the file
+        says that the actuators read.
+        """
+        q = self.machine.inverse(self.slots, self.own_home[None])
+        if self.model.chains is not None and not np.isfinite(q).all():
+            q = self.machine.at_drives(self.slots, self.model.chains.layout.zero[None])
+        return np.asarray(q[0])
+
+    @property
     def coordinates(self) -> tuple[str, ...]:
         """The m free coordinates of its pose, in the machine's own frame."""
         return MAPS[self.model.map]
@@ -163,9 +175,9 @@ class Kinematics:
     ) -> FloatArray:
         """Actuator coordinates of a pose, limb by limb in closed form.
 
-        Limb by limb means: a machine of fewer than six degrees of freedom gets coordinates for a pose
-        that it cannot take, and then goes elsewhere. `violation` says what its closures miss there;
-        with `match` the pose is completed first to one that it takes.
+        Limb by limb means: a machine of fewer than six degrees of freedom gets coordinates for a
+        pose that it cannot take, and then goes elsewhere. `violation` says what its closures miss
+        there; with `match` the pose is completed first to one that it takes.
 
         Parameters
         ----------
@@ -493,7 +505,7 @@ class Kinematics:
     def in_working_mode(self, own: FloatArray, q: FloatArray) -> BoolArray:
         """Whether limbs are on the branches of the file at own poses (N, 6) and q (N, n).
 
-        Chains, which the inverse has in the posture that is reached from home, count as if they were.
+        Chains, which the inverse has in the posture that is reached from home, count as such.
         """
         if self.model.chains is not None:
             return np.ones(len(q), dtype=bool)

@@ -31,7 +31,7 @@ CASES = {
 
 
 def with_errors(name: str) -> pk.Robot:
-    """Errors in every number, as a calibration leaves them: the file's home does not close any more."""
+    """Errors in every number, as calibrations leave them: the file's home does not close."""
     robot, rng = pk.load(name), np.random.default_rng(0)
     size = {"mm": 0.5, "rad": 3e-3}
     pairs = list(zip(robot.geometry.names, robot.geometry.units, strict=True))

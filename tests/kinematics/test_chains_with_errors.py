@@ -1,8 +1,8 @@
-"""Machines of chains with random errors: each is solved in the posture of the machine without them.
+"""Machines of chains with random errors: solved in the posture of the machine without them.
 
-A universal joint can be turned over: the limb is then at the same pose with the same actuator as long
-as there are no errors, and elsewhere with them. A machine whose errors grow goes through no such
-posture, and its pose is where a continuation from the ideal geometry leads.
+A universal joint can be turned over: the limb is then at the same pose with the same actuator as
+long as there are no errors, and elsewhere with them. A machine whose errors grow goes through no
+such posture, and its pose is where a continuation from the ideal geometry leads.
 """
 
 from __future__ import annotations

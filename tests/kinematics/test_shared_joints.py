@@ -1,7 +1,8 @@
-"""Limbs that share passive joints: each limb alone has such a joint in several places, all have one.
+"""Limbs that share passive joints: alone each has such a joint in several places, all have one.
 
-Passive joints, derivatives and the inverse of a row are those of the posture in which all limbs close
-together, which Newton's method found; compared with a twin in NumPy and with differences of `forward`.
+Passive joints, derivatives and the inverse of a row are those of the posture in which all limbs
+close together, which Newton's method found; compared with a twin in NumPy and with differences of
+`forward`.
 """
 
 from __future__ import annotations
