@@ -121,9 +121,24 @@ SHARED mask chain_reclose(const pkm_chains *machine, int l, const chain_numbers 
     return good;
 }
 
+/* What chains miss at a state with the joints that they share in one place: those that reach every pose,
+ * or all. */
+SHARED real chains_miss(const pkm_chains *machine, const chain_numbers *numbers, const real *R,
+                        const real *p, int all, const real *theta, const real *drive)
+{
+    const int *which, rows = group_rows(machine->map, &which);
+    real worst = fill(0.0), r[6];
+    for (int l = 0; l < machine->chains; l++) {
+        const int k = machine->first[l + 1] - machine->first[l];
+        const real missed = chain_missed(machine, l, numbers, R, p, theta, drive, r);
+        if (all || k >= (machine->ball[l] ? 3 : rows)) worst = larger(worst, missed);
+    }
+    return worst;
+}
+
 /* Every chain alone, and the mean of what they share. Where the actuators are not given, with `missed`
- * NULL, they follow, into `drive`, but those of the tail, which are. Else `nearly` is that of chain_reclose, and what chains miss is told
- * that reach every pose. */
+ * NULL, they follow, into `drive`, but those of the tail, which are. Else `nearly` is that of
+ * chain_reclose, and `missed` is what all chains miss, or without it those that reach every pose. */
 SHARED mask chains_assembled(const pkm_chains *machine, const chain_numbers *numbers, const real *R,
                              const real *p, real *missed, int nearly, real *theta, real *drive)
 {
@@ -144,7 +159,7 @@ SHARED mask chains_assembled(const pkm_chains *machine, const chain_numbers *num
         const mask settled = chain_assemble(machine, l, numbers, R, p, NULL, MAX_ASSEMBLY, theta, own);
         if (!missed) good &= settled;
         else good &= chain_reclose(machine, l, numbers, R, p, drive, nearly, theta, &misses);
-        if (missed && k >= rows) *missed = larger(*missed, misses);
+        if (missed && (nearly || k >= rows)) *missed = larger(*missed, misses);
         for (int j = machine->first[l]; j < machine->first[l + 1]; j++) {
             const int joint = machine->member[j], a = machine->actuator[joint];
             const int c = machine->coordinate[joint];
@@ -155,6 +170,7 @@ SHARED mask chains_assembled(const pkm_chains *machine, const chain_numbers *num
     for (int a = 0; a < machine->actuators; a++)
         if (!missed) drive[a] = sum[a] / drives[a];
     for (int s = 0; s < machine->shared; s++) theta[s] = joint_sum[s] / times[s];
+    if (missed && machine->shared) *missed = chains_miss(machine, numbers, R, p, nearly, theta, drive);
     return good;
 }
 

@@ -19,7 +19,10 @@ INLINE void chain_prepare(const chain_geometry *of, ptrdiff_t first, const ptrdi
 
 #define AT_HOME 0.1  /* rad, of the length: passive joints so near those of home are of its posture */
 #define POSTURE 2e-4 /* of the size: actuators that are farther from those of a posture may be another's */
-#define LIKELY 0.2   /* of that way: what the other then misses at most */
+#define LIKELY 0.2   /* of that way: what the other then misses at most, where the way is wide, */
+#define WIDE 0.1     /* of the size; less in proportion where it is shorter, for errors of the geometry
+                        move actuators too, and a universal joint turned over may miss less by chance */
+#define AGREED 1e-9  /* of the size: what chains miss that agree on the joints they share */
 
 /* How far passive joints are from home, and drives from those asked for, mm. */
 INLINE void chain_way(const pkm_chains *machine, const real *theta, const real *from, const real *to,
@@ -93,12 +96,17 @@ SHARED mask chain_guess(const pkm_chains *machine, const chain_numbers *numbers,
     }
     const mask far = ~(good & (way <= POSTURE * machine->size));
     start->doubt = other & far & good;
+    if (machine->shared) { /* one by one they may have a joint in two places */
+        const real apart = chains_miss(machine, numbers, R, p, 0, at->theta, start->from);
+        start->doubt |= good & ~(apart <= fill(AGREED * machine->size));
+    }
     start->likely = fill_mask(0);
     if (any(other & far)) {
         memcpy(drive, to, sizeof(real) * machine->actuators);
         start->second = *at;
         chains_assembled(machine, numbers, R, p, &missed, 1, start->second.theta, drive);
-        start->likely = start->doubt & (missed <= LIKELY * way);
+        const real wide = larger(way, fill(WIDE * machine->size));
+        start->likely = start->doubt & (missed * wide <= LIKELY * way * way);
         chain_choose(machine, other & far & ~good, start->second.theta, to, at->theta, start->from);
     }
     for (int c = 0; c < machine->passive; c++)
@@ -191,6 +199,8 @@ SHARED void chain_solve_again(const pkm_chains *machine, const chain_numbers *nu
     const mask taken = doubt & (other.status == ok) & (nearer | (found->status != ok));
     for (int s = 0; s < MAX_STATE; s++)
         found->at.state[s] = select(taken, other.at.state[s], found->at.state[s]);
+    for (int c = 0; c < machine->passive; c++)
+        found->at.theta[c] = select(taken, other.at.theta[c], found->at.theta[c]);
     found->status = select_mask(taken, other.status, found->status);
     found->iterations = select(doubt, found->iterations + other.iterations, found->iterations);
     found->residual = select(taken, other.residual, found->residual);
@@ -212,18 +222,32 @@ SHARED void chain_settle_doubt(const pkm_chains *machine, const chain_numbers *n
                                const chain_start *start, const real *to, mask valid,
                                chain_answer *found)
 {
-    const mask likely = start->likely & valid, lost = start->doubt & ~start->likely & valid;
+    const mask likely = start->likely & valid, other = start->doubt & ~start->likely & valid;
     if (any(likely))
         chain_solve_again(machine, numbers, &start->at, &start->second, to, to, likely, found);
-    if (!any(lost)) return;
+    if (!any(other)) return;
     const motion frame = fill_motion(machine->home);
     chain_start home;
     real pose[6], drive[PKM_MAX_LIMBS];
     memcpy(drive, to, sizeof(real) * machine->actuators);
     FN(motion_pose)(frame.R, frame.p, pose);
     chain_guess(machine, numbers, pose, drive, &home);
+    const mask lost = other & (states_apart(machine, start->at.state, home.at.state) > fill(0.0));
+    if (!any(lost)) return;
     chain_unwind(machine, home.from, drive);
     chain_solve_again(machine, numbers, &start->at, &home.at, home.from, drive, lost, found);
+}
+
+/* Are the drives such as a machine can be at? Angles beyond these have lost digits, and so have their
+ * turns. */
+INLINE mask chain_within(const pkm_chains *machine, const real *drive)
+{
+    mask within = fill_mask(-1);
+    for (int j = 0; j < machine->joints; j++) {
+        const double most = machine->prismatic[j] ? 1e30 : MAX_ANGLE;
+        if (machine->actuator[j] >= 0) within &= absolute(drive[machine->actuator[j]]) <= fill(most);
+    }
+    return within;
 }
 
 int CALL(chain_forward)(const pkm_chains *machine, ptrdiff_t n, const double *geometry,
@@ -251,15 +275,18 @@ int CALL(chain_forward)(const pkm_chains *machine, ptrdiff_t n, const double *ge
             own = any(chain_guess(machine, &numbers, begin, drive, &start));
             chain_predict(machine, &numbers, &start.at, start.from, &predicted);
         }
+        const mask within = chain_within(machine, drive);
         chain_unwind(machine, start.from, drive);
-        for (int a = 0; a < machine->actuators; a++) valid &= finite(drive[a]) & finite(lane_q[a]);
+        for (int a = 0; a < machine->actuators; a++) valid &= finite(lane_q[a]);
         for (int k = 0; k < 6; k++) valid &= finite(begin[k]);
         for (int k = 0; geometry_stride && k < machine->numbers; k++)
             valid &= finite(gather(geometry + k, geometry_stride, row));
-        chain_solve(machine, &numbers, &start.at, &predicted, start.from, drive, valid, &answer.at,
+        const mask usable = valid & within;
+        chain_solve(machine, &numbers, &start.at, &predicted, start.from, drive, usable, &answer.at,
                     &answer.status, &answer.iterations, &answer.residual);
-        chain_settle_doubt(machine, &numbers, &start, drive, valid, &answer);
-        const mask how = select_mask(valid, answer.status, fill_mask(PKM_INVALID));
+        chain_settle_doubt(machine, &numbers, &start, drive, usable, &answer);
+        mask how = select_mask(within, answer.status, fill_mask(PKM_INFEASIBLE));
+        how = select_mask(valid, how, fill_mask(PKM_INVALID));
         const mask good = how == fill_mask(PKM_OK), closest = good | (how == fill_mask(PKM_NOT_CLOSED));
         map_to_pose(machine->map, answer.at.state, found);
         for (int k = 0; k < 6; k++) found[k] = select(good, found[k], fill(NAN));
@@ -300,6 +327,37 @@ int CALL(chain_inverse)(const pkm_chains *machine, ptrdiff_t n, const double *ge
 
 #define HELD 1e-4 /* of the size: a chain that misses by more is not where its pose and actuators say */
 
+/* Where chains one by one do not agree on a joint that they share: the passive joints with which Newton's
+ * method rests at the pose, from there or from home. */
+SHARED void chain_agree(const pkm_chains *machine, const chain_numbers *numbers, const real *pose,
+                        const real *R, const real *p, const real *drive, chain_state *at, real *missed)
+{
+    const motion home = fill_motion(machine->home);
+    real from[6];
+    memcpy(from, pose, sizeof from);
+    for (int attempt = 0; attempt < 2; attempt++) {
+        const mask open = ~(*missed <= fill(AGREED * machine->size)) & finite(pose[0]);
+        chain_start start = {0};
+        chain_prediction predicted;
+        chain_answer answer;
+        real to[PKM_MAX_LIMBS];
+        if (!any(open)) return;
+        if (attempt) FN(motion_pose)(home.R, home.p, from);
+        memcpy(to, drive, sizeof(real) * machine->actuators);
+        chain_guess(machine, numbers, from, to, &start);
+        chain_predict(machine, numbers, &start.at, start.from, &predicted);
+        chain_unwind(machine, start.from, to);
+        chain_solve(machine, numbers, &start.at, &predicted, start.from, to, open, &answer.at,
+                    &answer.status, &answer.iterations, &answer.residual);
+        chain_settle_doubt(machine, numbers, &start, to, open, &answer);
+        const real misses = chains_miss(machine, numbers, R, p, 0, answer.at.theta, drive);
+        const mask better = open & (answer.status == fill_mask(PKM_OK)) & ~(misses >= *missed);
+        for (int c = 0; c < machine->passive; c++)
+            at->theta[c] = select(better, answer.at.theta[c], at->theta[c]);
+        *missed = select(better, misses, *missed);
+    }
+}
+
 /* What inspection starts from: a block of poses and coordinates, with the passive joints there; `held`
  * says where these are found. */
 INLINE mask chain_inspect(const pkm_chains *machine, const chain_numbers *numbers,
@@ -313,7 +371,11 @@ INLINE mask chain_inspect(const pkm_chains *machine, const chain_numbers *number
     FN(map_frame)(machine->map, at->state, R, p);
     chain_drives(machine, numbers, lane_q, drive);
     real missed;
-    const mask good = chains_assembled(machine, numbers, R, p, &missed, 0, at->theta, drive);
+    mask good = chains_assembled(machine, numbers, R, p, &missed, 0, at->theta, drive);
+    if (machine->shared) {
+        chain_agree(machine, numbers, lane_pose, R, p, drive, at, &missed);
+        good |= missed <= fill(HELD * machine->size);
+    }
     *held = machine->over ? fill_mask(-1) : missed <= fill(HELD * machine->size);
     return good;
 }

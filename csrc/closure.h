@@ -122,7 +122,8 @@ INLINE void sphere_of_numbers(int driver, const limb_numbers *limb, FN(limb_sphe
 }
 
 /* The rest of the sphere, at actuator coordinate q. `reachable` falls where a length is not
- * positive, or so large or small that its square or its reciprocal leaves the floats. */
+ * positive, or so large or small that its square or its reciprocal leaves the floats, and where an angle
+ * is so large that its sine has lost digits. */
 INLINE void sphere_at(int driver, const limb_numbers *limb, real q, FN(limb_sphere) *sphere,
                       mask *reachable)
 {
@@ -138,7 +139,8 @@ INLINE void sphere_at(int driver, const limb_numbers *limb, real q, FN(limb_sphe
         NO_OTHER_CASE;
 #undef CASE
     }
-    *reachable &= (sphere->rho > fill(1e-30)) & (sphere->rho < fill(1e30)) & (absolute(qt) < fill(1e30));
+    const double most = driver == DRIVER_CRANK ? MAX_ANGLE : 1e30;
+    *reachable &= (sphere->rho > fill(1e-30)) & (sphere->rho < fill(1e30)) & (absolute(qt) <= fill(most));
 }
 
 /* Does q̃ move the anchor? Does it change the length? */

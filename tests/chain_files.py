@@ -226,3 +226,31 @@ def drawn(map: str, rng: np.random.Generator) -> str:
 def _direction(rng: np.random.Generator, way: FloatArray) -> FloatArray:
     found = rng.normal(size=3) * (way if way.any() else np.ones(3))
     return np.asarray(found / np.linalg.norm(found))
+
+
+def delta_of_hinges(angles: tuple[float, ...]) -> str:
+    """An H4: four vertical carriages of two rods each, two hinges for four rods each."""
+    radius, end, height, apart = 220.0, 50.0, -400.0, 25.0
+    lines = [
+        'name = "H4"\nunits = { length = "mm", angle = "rad" }\n[pose]\nmap = "spatial"',
+        f'home = {{ z = {height} }}\nmatch = ["x", "y", "z", "gamma"]',
+    ]
+    for n, angle in enumerate(np.radians(angles), 1):
+        out, across = (
+            np.array([np.cos(angle), np.sin(angle), 0.0]),
+            np.array([-np.sin(angle), np.cos(angle), 0.0]),
+        )
+        hinge, y = ("one", 50.0) if n < 3 else ("other", -50.0)
+        for side in (-1, 1):
+            base, tip = radius * out + side * apart * across, end * out + side * apart * across
+            tip[2] = height
+            carriage, turned = f'share = "carriage{n}"', f'share = "{hinge}"'
+            if side < 0:
+                at = (radius * out).tolist()
+                carriage += f', kind = "P", at = {at}, axis = [0, 0, 1], actuator = {n}'
+            if side < 0 and n in (1, 3):
+                turned += f', kind = "R", at = [0, {y}, {height}], axis = [0, 0, 1]'
+            rod = f'{{ kind = "U", at = {base.tolist()} }}, {{ kind = "S", at = {tip.tolist()} }}'
+            lines.append('[[limb]]\nkind = "chain"')
+            lines.append(f"joints = [ {{ {carriage} }}, {rod}, {{ {turned} }} ]")
+    return "\n".join(lines) + "\n"

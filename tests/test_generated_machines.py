@@ -113,6 +113,8 @@ def judged(kind: str, seed: int, rows: int) -> Counter[str]:
         ]
         clear = np.isfinite(sides[0]) & (np.abs(sides).min(axis=0) > 1e-6)
         same = np.sign(sides[0]) == np.sign(sides[1])
+        folded = np.abs(robot.inverse(out(there), near=sent[ok]) - sent[ok]) > 1e-6
+        same &= ~folded.any(axis=1)
         found["wrong: side"] += int((same != solved.same_side[ok])[clear].sum())
     found["rows"] += rows
     return found

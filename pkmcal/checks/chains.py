@@ -98,9 +98,24 @@ def idle_tail(robot: Robot) -> Iterator[Finding]:
 
 
 def singular_anywhere(robot: Robot) -> Iterator[Finding]:
-    """`singular`, of machines whose poses determine their actuators."""
-    if not _has_idle_tail(robot):
-        yield from singular(robot)
+    """`singular`, of machines whose poses determine their actuators; exactly at home, too.
+
+    The inverse goes from home by rates that do not exist there, so that no other pose is reached.
+    """
+    if _has_idle_tail(robot):
+        return
+    found = list(singular(robot))
+    yield from found
+    own, q = _home(robot)
+    home, away = len(_free_ways(robot, own, q)), len(_free_ways(robot, *_away(robot)))
+    if not found and home > away:
+        yield Finding(
+            "singular",
+            (),
+            f"home is singular: with the actuators held the platform still moves in {home} ways"
+            f" there, nearby in {away}",
+            "choose another home pose; forward() and inverse() start there",
+        )
 
 
 CHAIN_CHECKS = (
@@ -133,8 +148,7 @@ def surplus(robot: Robot) -> str:
 
 
 def _home(robot: Robot) -> tuple[FloatArray, FloatArray]:
-    own = np.ascontiguousarray(robot.own_home[None])
-    return own, robot.machine.inverse(robot.slots, own)
+    return np.ascontiguousarray(robot.own_home[None]), robot.home_actuators[None]
 
 
 def _away(robot: Robot) -> tuple[FloatArray, FloatArray]:

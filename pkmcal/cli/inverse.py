@@ -11,6 +11,7 @@ from pkmcal.cli.inputs import Inputs
 from pkmcal.cli.options import Force, Json, ParallelRobot, Radians
 from pkmcal.cli.output import Output, say
 from pkmcal.cli.rows import POSE_UNITS, numbers_on_line, table
+from pkmcal.cli.taken import Taken
 from pkmcal.kinematics.reading_units import reading_units
 from pkmcal.loading import load_parallel
 from pkmcal.measurements.command_csv import write_commands
@@ -31,9 +32,10 @@ def inverse(
     match: Annotated[
         bool,
         typer.Option(
-            "--match", help="Keep the coordinates that the machine determines, complete the others."
+            "--match/--no-match",
+            help="Complete poses that the limbs do not allow (default), or take them as given.",
         ),
-    ] = False,
+    ] = True,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Write commands.csv, exact.")
     ] = None,
@@ -42,7 +44,11 @@ def inverse(
 ) -> int:
     """Print the actuator coordinates that lead to poses.
 
-    Exit code 1: a limb cannot reach some of the poses, or breaks a limit there.
+    Of a pose that the limbs do not allow the machine keeps as many coordinates as it can move,
+    those that its file declares, and the others follow.
+
+    Exit code 1: no pose keeps these coordinates, the closures miss a pose, a limb cannot reach it,
+    or breaks a limit there.
 
     Example: pkmcal inverse hexapod 20,-10,860,5,0,3
     """
@@ -51,10 +57,9 @@ def inverse(
     row = numbers_on_line("poses", poses, POSE_UNITS, rad)
     rows = read_poses(read.file(poses), machine) if row is None else row
     output = None if out is None else Output(out, ["commands.csv"], read, force)
-    if match:
-        rows = machine.complete(rows)
-    q = machine.inverse(rows)
-    allowed = machine.feasible(rows)
+    taken = Taken.of(machine, rows, match)
+    q, allowed = taken.actuators, machine.feasible(taken.asked)
+    ok = allowed.ok & taken.ok
     units = reading_units(machine)
     if output is not None:
         with output.draft() as draft:
@@ -62,15 +67,15 @@ def inverse(
     if json:
         say(
             as_json(
-                {"actuators": q, "units": units, "ok": allowed.ok},
+                {"actuators": q, "units": units, "ok": ok, "pose": taken.pose},
                 schema="inverse",
             )
         )
     else:
         heads = [f"q{i + 1}" for i in range(machine.n_actuators)]
         say(table(heads, units, q))
-        for line in allowed.broken():
+        for line in (*taken.said(), *allowed.broken()):
             say(line)
         if output is not None:
             say(f"\ncommands: {output.paths[0]}")
-    return 0 if allowed.ok.all() else 1
+    return 0 if ok.all() else 1

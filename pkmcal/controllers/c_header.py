@@ -165,6 +165,9 @@ def _contents(robot: Robot, prefix: str, number: Number) -> dict[str, Any]:
         },
         "functions": texts,
         "length": f"{robot.length:.6g}",
+        "arm": one(robot.length),
+        # so far apart are the drives of a limb's branches; rounding and what a step leaves are less
+        "folded": one((1e-6 if wide else 1e-3) * size),
         "per_length": one(1.0 / robot.length),
         "size": one(size),
         "largest": "DBL_MAX" if wide else "FLT_MAX",

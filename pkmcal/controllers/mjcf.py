@@ -31,7 +31,8 @@ _METRE = 1e-3
 def mjcf(robot: Robot, path: str | PathLike[str]) -> None:
     """Write a robot as an MJCF file of MuJoCo.
 
-    The model stands in the home pose, in metres and radians. Joint ``q1`` and so on are the limbs'
+    The model stands in the home pose, or beside it where errors of the geometry do not let it close
+    there, in metres and radians. Joint ``q1`` and so on are the limbs'
     own coordinates, `gain` · q + `offset`; each has a position actuator. Masses and inertias are
     1 kg and 0.01 kg m² throughout: a robot file has none.
 
@@ -65,19 +66,17 @@ def text_of(robot: Robot) -> str:
     """The MJCF text."""
     _require(robot)
     require_plain_limbs(robot, "this model")
-    home = robot.own_home
-    drives, directions, _ = robot.limb_machine.limbs(robot.slots, home[None])
-    if not np.isfinite(drives).all():
-        raise ArgumentError(f"robot: {robot.name} cannot reach its home pose")
+    home, drives = _closed_home(robot)
+    directions = robot.limb_machine.limbs(robot.slots, home[None])[1]
     top = Xml.Element("mujoco", model=robot.name)
     Xml.SubElement(top, "compiler", angle="radian", autolimits="false")
     world = Xml.SubElement(top, "worldbody")
-    _platform(world, robot)
+    _platform(world, robot.model.map, home)
     equality, actuator = Xml.SubElement(top, "equality"), Xml.SubElement(top, "actuator")
     first, second, _, axes = prepared(robot)
     driving: dict[int, int] = {}
     for i, limb in enumerate(robot.model.limbs):
-        kind, g, drive = KINDS[limb.kind], robot.slots[i], float(drives[0, i])
+        kind, g, drive = KINDS[limb.kind], robot.slots[i], float(drives[i])
         tip = _limb(
             world, i, kind.driver, g, drive, directions[0, i], (first[i], second[i]), axes[i][0]
         )
@@ -111,11 +110,24 @@ def _require(robot: Robot) -> None:
         raise ArgumentError(f"robot: {robot.name} has what this model cannot hold: {reasons[0]}")
 
 
-def _platform(world: Xml.Element, robot: Robot) -> None:
-    home = robot.own_home
+def _closed_home(robot: Robot) -> tuple[FloatArray, FloatArray]:
+    """The own pose (6,) beside home at which all limbs close, and their drives there (limbs,).
+
+    The file's home is that of the machine without errors. Links that are taken there point where
+    they cannot with errors, and limbs that share an actuator ask for different coordinates.
+    """
+    q = robot.inverse(robot.home)[None]
+    found = robot.forward(q)
+    if not found.ok.all():
+        why = found.failures() if np.isfinite(q).all() else "a limb does not reach it"
+        raise ArgumentError(f"robot: {robot.name} cannot take its home pose: {why}")
+    return robot.frames.inward(found.pose)[0], robot.drives(q)[0]
+
+
+def _platform(world: Xml.Element, map: str, home: FloatArray) -> None:
     turned = Rotation.from_euler("xyz", home[3:])
     body = _body(world, "platform", home[:3], turned)
-    names = _PLATFORM[robot.model.map]
+    names = _PLATFORM[map]
     if not names:
         Xml.SubElement(body, "freejoint", name="platform")
     for name in names:

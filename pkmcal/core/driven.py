@@ -138,13 +138,14 @@ class DrivenMachine(CoreMachine):
         """Readings (N, n) of drives; of those that share an actuator the mean."""
         state = self._state(len(way))
         q = self.laws.readings(slots, way, *state)
-        out: FloatArray = q[:, [drives[0] for drives in self._driven]]
+        out = np.ascontiguousarray(q[:, [drives[0] for drives in self._driven]])
         if len(self._driven) == len(self.laws.drives):
             return out
         there = self.laws.ways(slots, out, *state).way  # of all that share, as the first has it
         with np.errstate(invalid="ignore"):  # ways that are infinite
             turned = way + 2 * np.pi * np.rint((there - way) / (2 * np.pi))
-        return self._mean(self.laws.readings(slots, np.where(self.turning, turned, way), *state))
+        readings = self.laws.readings(slots, np.where(self.turning, turned, way), *state)
+        return np.ascontiguousarray(self._mean(readings))
 
     def _mean(self, each: FloatArray) -> FloatArray:
         """Of drives (N, drives, ...) that share an actuator the mean, (N, n, ...)."""

@@ -182,12 +182,12 @@ def complete(
         kept = (np.abs(_off(seen, matched, wanted)) <= limit).all(axis=1)
         own = seen.copy() if frames.trivial else own
     # not at a stationary point that is no solution, and with no limb on its other branch
-    unsolved = ~(kept & _as_inverse(machine, slots, own, q))
+    unsolved = ~(kept & in_working_mode(machine, slots, own, q))
     seen[unsolved], own[unsolved], q[unsolved] = np.nan, np.nan, np.nan
     return Completed(seen, own, q)
 
 
-def _as_inverse(
+def in_working_mode(
     machine: CompiledMachine, slots: FloatArray, own: FloatArray, q: FloatArray
 ) -> BoolArray:
     """Whether limbs at actuators (N, n) are in the working mode in which the inverse has them."""

@@ -23,6 +23,9 @@ class Solved(Protocol):
     def closure_by_twist(self, own: FloatArray, q: FloatArray | None = None) -> FloatArray:
         """Closure rows by a scaled twist, (N, rows, m); q by default the inverse of the poses."""
 
+    def in_working_mode(self, own: FloatArray, q: FloatArray) -> BoolArray:
+        """Whether limbs are on the branches of the file at own poses (N, 6) and q (N, n)."""
+
     def assembly_problem(self, q: FloatArray) -> AssemblyProblem:
         """The closures at coordinates (N, n)."""
 
@@ -78,11 +81,14 @@ class Forward(RowResult):
 
     @cached_property
     def same_side(self) -> BoolArray:
-        """Whether the determinant has the sign it has at the guess (...), computed when asked for.
+        """Whether no singularity must lie between the guess and the pose (...).
 
-        At the guess with the actuators that lead there. False means that the pose is another
-        assembly mode than the guess's, with a singularity between. True where it is unknown: with
-        more closures than free coordinates, and where a limb does not reach the guess.
+        Computed when asked for: the determinant has the sign it has at the guess, with the
+        actuators that lead there, and each limb in closed form is on the branch that its file
+        states, as at the guess. False means that the pose is another assembly mode than the
+        guess's, with a singularity between. True where it is unknown: with more closures than free
+        coordinates, and where a limb does not reach the guess. Modes with one sign and the same
+        branches are not told apart.
         """
         steps = self._closure_by_twist(self._own)
         if steps.shape[-2] != steps.shape[-1]:
@@ -92,7 +98,8 @@ class Forward(RowResult):
         with np.errstate(invalid="ignore"):  # rows that failed, guesses out of reach
             there, sign = (np.sign(np.linalg.det(each)) for each in (steps, at_guess))
         sign = sign[0] if self._guess.ndim == 1 else sign.reshape(same.shape)
-        return np.asarray(same & ((there == sign) | np.isnan(sign)))
+        kept = self._machine.in_working_mode(self._own.reshape(-1, 6), self._q).reshape(same.shape)
+        return np.asarray(same & (((there == sign) & kept) | np.isnan(sign)))
 
     @cached_property
     def certificate(self) -> Certificate:

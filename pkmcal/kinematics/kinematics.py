@@ -19,7 +19,12 @@ from pkmcal.core.pulleys import PulleyMachine
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.model import CHAIN, Model
-from pkmcal.kinematics.complete import Completed, complete, matched_coordinates
+from pkmcal.kinematics.complete import (
+    Completed,
+    complete,
+    in_working_mode,
+    matched_coordinates,
+)
 from pkmcal.kinematics.forward import Forward
 from pkmcal.kinematics.frames import Frames
 from pkmcal.kinematics.limits import kept, margin_of
@@ -62,6 +67,8 @@ class Kinematics:
         self.frames = Frames(model.base_frame, model.tool_frame)
         self.machine = machine_of(model, self.slots, self.length)
         self.own_home = self.on_map(np.array(model.home, dtype=np.float64)[None])[0].copy()
+        for kept_array in (self.slots, self.own_home):
+            kept_array.setflags(write=False)
 
     @property
     def limb_machine(self) -> Machine | DrivenMachine:
@@ -81,6 +88,18 @@ class Kinematics:
         """Home pose (6,), mm and rad: in the middle of the workspace."""
         home: FloatArray = self.frames.outward(self.own_home[None])[0].copy()
         return home
+
+    @property
+    def home_actuators(self) -> FloatArray:
+        """Actuator coordinates (n,) at home; NaN where a limb does not reach it.
+
+        The inverse of home, or, where chains are singular there and it finds nothing, what the file
+        says that the actuators read.
+        """
+        q = self.machine.inverse(self.slots, self.own_home[None])
+        if self.model.chains is not None and not np.isfinite(q).all():
+            q = self.machine.at_drives(self.slots, self.model.chains.layout.zero[None])
+        return np.asarray(q[0])
 
     @property
     def coordinates(self) -> tuple[str, ...]:
@@ -155,6 +174,10 @@ class Kinematics:
         out: FloatArray | None = None,
     ) -> FloatArray:
         """Actuator coordinates of a pose, limb by limb in closed form.
+
+        Limb by limb means: a machine of fewer than six degrees of freedom gets coordinates for a
+        pose that it cannot take, and then goes elsewhere. `violation` says what its closures miss
+        there; with `match` the pose is completed first to one that it takes.
 
         Parameters
         ----------
@@ -478,6 +501,15 @@ class Kinematics:
         if q is None:
             q = self.machine.inverse(self.slots, self.on_map(own))
         return self.machine.closure(self.slots, own, q).by_step
+
+    def in_working_mode(self, own: FloatArray, q: FloatArray) -> BoolArray:
+        """Whether limbs are on the branches of the file at own poses (N, 6) and q (N, n).
+
+        Chains, which the inverse has in the posture that is reached from home, count as such.
+        """
+        if self.model.chains is not None:
+            return np.ones(len(q), dtype=bool)
+        return in_working_mode(self.machine, self.slots, own, q)
 
     def on_map(self, own: FloatArray) -> FloatArray:
         """Own poses (N, 6) as the pose map has them: what it does not move is not looked at."""

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from pkmcal.arguments import checked_seed, did_you_mean, number, shown, whole
 from pkmcal.arrays import BoolArray, FloatArray, as_rows
-from pkmcal.core.library import POSE
+from pkmcal.core.library import POSE, STATUS
 from pkmcal.display import Table, displayed
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.geometry.box import in_box
@@ -227,6 +227,8 @@ def reach(robot: Robot) -> dict[str, tuple[float, float]]:
                 " that the machine can take"
             )
         broken = robot.feasible(robot.home[None]).broken()
+        if STATUS[int(robot.forward(robot.home_actuators).status)] == "singular":
+            broken = []  # the inverse starts there: it finds no pose
         why = f"home breaks a limit: {'; '.join(broken)}" if broken else "home is singular"
         if not broken and not pulled(robot, robot.home[None])[0]:
             why = "at home some cable would have to push, under the load of the file"

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
+from pkmcal.core.library import POSE
 from pkmcal.measurements.command_csv import read_commands, write_commands
 from pkmcal.measurements.pose_csv import read_poses, write_poses
 
@@ -109,3 +110,29 @@ def test_commands_come_back_to_the_last_bit(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read_commands(tmp_path / "q.csv", ("mm", "rad")), q)
     with pytest.raises(ValueError, match=r"q.csv, line 2: column 'q2' has unit \[rad\]"):
         read_commands(tmp_path / "q.csv", ("mm", "mm"))
+
+
+@pytest.mark.parametrize("name", ["3rps", "2tpr2tps", "exechon", "linear-delta", "3rrr-planar"])
+def test_inverse_completes_a_pose_that_the_machine_cannot_take(run: Any, name: str) -> None:
+    """Its actuators lead to the pose that is printed, which keeps what the file declares."""
+    robot = pk.load(name)
+    asked = robot.home + np.array([3.0, -2.0, 5.0, 0.03, 0.02, 0.01])
+    assert robot.violation(asked) > 0.1
+    line = ["inverse", name, ",".join(map(repr, asked.tolist())), "--rad"]
+    said = json.loads(run(*line, "--json").stdout)
+    pose = np.array(said["pose"][0])
+    kept = [POSE.index(c) for c in robot.moved]
+    np.testing.assert_allclose(pose[kept], asked[kept], atol=1e-9)
+    reached = robot.forward(said["actuators"][0], guess=pose)
+    np.testing.assert_allclose(reached.pose, pose, atol=1e-7)
+    assert "the others follow" in run(*line).stdout
+
+
+def test_inverse_that_cannot_be_completed_or_is_not_ends_with_1(run: Any) -> None:
+    result = run("inverse", "linear-delta", "900,0,0,0,0,0")
+    assert result.exit_code == 1 and "no pose found that keeps x, y, z" in result.stdout
+    robot = pk.load("3rps")
+    asked = ",".join(map(repr, (robot.home + np.array([0, 5.0, 0, 0, 0, 0])).tolist()))
+    assert run("inverse", "3rps", asked, "--rad").exit_code == 0
+    result = run("inverse", "3rps", asked, "--rad", "--no-match")
+    assert result.exit_code == 1 and "closures miss this pose by" in result.stdout

@@ -35,6 +35,12 @@ int jacobian(const {real} *pose, {real} *by_free);
 int inverse(const {real} *pose, {real} *q) {{ return robot_inverse(pose, q); }}
 int forward(const {real} *q, {real} *pose) {{ return robot_forward(q, pose); }}
 int jacobian(const {real} *pose, {real} *by_free) {{ return robot_jacobian(pose, by_free); }}
+int missed(const {real} *pose, {real} *by);
+int missed(const {real} *pose, {real} *by) {{ return robot_missed(pose, by); }}
+"""
+_SIDE = """\
+int side(const {real} *q, {real} *pose);
+int side(const {real} *q, {real} *pose) {{ return robot_side(q, pose); }}
 """
 
 
@@ -49,7 +55,8 @@ def compiled(robot: pk.Robot, folder: Path, number: Any = "double", compiler: st
     """The functions of a robot's header, in a shared library."""
     needed(compiler)
     pk.export.c_header(robot, folder / "robot.h", number)
-    (folder / "robot.c").write_text(_LIBRARY.format(real=number))
+    text = _LIBRARY + (_SIDE if robot.machine.rows == robot.machine.m else "")
+    (folder / "robot.c").write_text(text.format(real=number))
     built = folder / f"robot-{compiler}-{number}.so"
     command = [compiler, *STRICT, "-shared", "-fPIC", "-o", built, folder / "robot.c", "-lm"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -87,6 +94,12 @@ class Library:
 
     def forward(self, q: Any, guess: Any) -> tuple[Any, Any]:
         return self._rows("forward", q, np.broadcast_to(guess, (len(q), 6)))
+
+    def missed(self, poses: Any) -> tuple[Any, Any]:
+        return self._rows("missed", poses, np.full((len(poses), 1), np.nan))
+
+    def side(self, q: Any, poses: Any) -> Any:
+        return self._rows("side", q, poses)[0]
 
     def _rows(self, name: str, given: Any, written: Any) -> tuple[Any, Any]:
         call = getattr(self._library, name)

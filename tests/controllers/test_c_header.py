@@ -505,3 +505,37 @@ def test_a_hexapod_takes_four_kilobytes_of_a_controller(tmp_path: Path) -> None:
     text = subprocess.run(size, capture_output=True, text=True, check=True).stdout
     code, data, bss = map(int, text.splitlines()[1].split()[:3])
     assert code <= 4096 and data == bss == 0
+
+
+SIDES = ("hexapod", "3rrr-planar", "linear-delta", "linear-delta-6", "rotary-delta", "tricept")
+
+
+@pytest.mark.parametrize("name", SIDES)
+def test_a_pose_from_home_in_another_mode_is_on_another_side(name: str, tmp_path: Path) -> None:
+    """Where the header lands elsewhere than `Robot.forward`, and never where it does not."""
+    robot = pk.load(name)
+    library = compiled(robot, tmp_path)
+    at = pk.sample_poses(robot, 300, seed=3, share=0.9)
+    q = robot.inverse(at, match=True)
+    status, found = library.forward(q, robot.home)
+    home = library.side(robot.inverse(robot.home)[None], robot.home[None])[0]
+    same = library.side(q, found) * home > 0
+    ok, right = status == 0, np.abs(found - at).max(axis=1) < 1e-6
+    assert home != 0 and same[ok & right].all() and not same[ok & ~right].any()
+    assert (ok & ~right).any() or name not in ("3rrr-planar", "linear-delta", "linear-delta-6")
+
+
+@pytest.mark.parametrize("name", [*SIDES, "3rps", "2tpr2tps-spatial"])
+def test_what_a_pose_misses_is_how_far_from_it_the_machine_goes(name: str, tmp_path: Path) -> None:
+    robot = pk.load(name)
+    library, rng = compiled(robot, tmp_path), np.random.default_rng(5)
+    way = [3.0, 3.0, 3.0, 0.02, 0.02, 0.02]
+    asked = pk.sample_poses(robot, 60, seed=4) + rng.uniform(-1, 1, (60, 6)) * way
+    status, missed = library.missed(asked)
+    there = robot.forward(robot.inverse(asked), guess=asked)
+    off = np.abs(pk.screw.from_pose(there.pose) - pk.screw.from_pose(asked))[:, :3]
+    want = np.maximum(off[..., 3].max(axis=1), robot.length * off[..., :3].max(axis=(1, 2)))
+    ok = (status == 0) & there.ok
+    assert ok.sum() > 50
+    np.testing.assert_allclose(missed[ok, 0], want[ok], atol=1e-8)
+    assert np.median(want[ok]) > 0.1 or len(robot.moved) == 6

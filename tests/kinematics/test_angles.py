@@ -368,3 +368,21 @@ def test_turning_joints_of_chains_stay_in_their_strokes_whatever_gain_and_offset
             other.drives(q[None])[0], robot.drives(robot.inverse(robot.home)[None])[0], atol=1e-9
         )
         assert other.forward(q).ok
+
+
+@pytest.mark.parametrize(
+    "name", ["rotary-delta", "3rrr-planar", "five-bar", "eclipse", "agile-eye"]
+)
+def test_an_angle_that_has_lost_its_digits_is_infeasible(name: str) -> None:
+    """Whole turns are taken off up to 1e5 rad, of limbs and of chains; beyond, a turn is not known."""
+    robot = pk.load(name)
+    q = robot.inverse(robot.home)
+    turning = int(np.flatnonzero(np.isfinite(robot.turns))[0])
+    for size in (1e3, 9e4, 1.1e5, 1e9, 1e12, 1e18, 1e300):
+        sent = q.copy()
+        sent[turning] += robot.turns[turning] * np.round(size / robot.turns[turning])
+        found = robot.forward(sent)
+        if size < 1e5:
+            assert found.ok and np.abs(found.pose - robot.home).max() < 1e-7
+        else:
+            assert found.status == 3 and np.isnan(found.pose).all()

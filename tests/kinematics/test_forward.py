@@ -110,7 +110,7 @@ def test_conditioning_and_sides_are_those_of_single_rows_in_any_shape() -> None:
 
 
 @pytest.mark.parametrize("name", SQUARE)
-def test_same_side_is_whether_the_twins_determinants_agree(name: str) -> None:
+def test_same_side_is_whether_the_twins_determinants_and_branches_agree(name: str) -> None:
     robot, rng = pk.load(name), np.random.default_rng(22)
     at = poses(name, 300, seed=22)
     q, guess = robot.inverse(at), at + 5.0 * rng.uniform(-1, 1, at.shape) * WORKSPACE[name]
@@ -123,9 +123,22 @@ def test_same_side_is_whether_the_twins_determinants_agree(name: str) -> None:
             signs.append(True)  # out of reach: unknown
             continue
         sides = derivative(robot, there, q[i]), derivative(robot, start, own)
-        signs.append(np.prod(np.sign(np.linalg.det(sides))) > 0)
+        way = robot.nearest_turns(twin.inverse(robot.model, there), near=q[i]) - q[i]
+        on_branch = bool((np.abs(way) < 1e-6).all())  # not so of a limb that has folded over
+        signs.append(np.prod(np.sign(np.linalg.det(sides))) > 0 and on_branch)
     assert found.same_side[found.ok].tolist() == signs
     assert not found.same_side[~found.ok].any() and len(signs) > 30
+
+
+@pytest.mark.parametrize("name", ["3rrr-planar", "rotary-delta", "five-bar", "6-rus"])
+def test_a_pose_from_home_in_another_mode_is_on_another_side(name: str) -> None:
+    """Also where a crank has folded over and the determinant has changed its sign twice."""
+    robot = pk.load(name)
+    at = pk.sample_poses(robot, 400, seed=3, share=0.9)
+    found = robot.forward(robot.inverse(at, match=True))
+    other = found.ok & (np.abs(found.pose - at).max(axis=1) > 1e-6)
+    assert not found.same_side[other].any() and found.same_side[found.ok & ~other].all()
+    assert other.sum() > 30 or name != "3rrr-planar"
 
 
 def on_the_map(robot: pk.Robot, pose: np.ndarray) -> np.ndarray:

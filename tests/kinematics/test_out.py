@@ -134,3 +134,13 @@ def test_arrays_with_a_mask_are_refused() -> None:
     robot = pk.load("hexapod")
     with pytest.raises(TypeError, match="out must be an array without a mask"):
         robot.inverse(robot.home, out=np.ma.masked_all(6))
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_rows_of_the_inverse_lie_one_behind_the_other(name: str) -> None:
+    """So that a row's address is what C needs; what a robot keeps cannot be written to."""
+    robot = MACHINES[name]()
+    assert robot.inverse(np.tile(robot.home, (5, 1))).flags.c_contiguous
+    for kept in (robot.own_home, robot.slots):
+        with pytest.raises(ValueError, match="read-only"):
+            kept[...] = 0.0
