@@ -13,7 +13,7 @@
 #include <string.h>
 
 #include "pkmcal.h"
-#ifdef __x86_64__
+#ifdef __SSE2__
 #include <immintrin.h>
 #endif
 
@@ -179,13 +179,13 @@ INLINE int any(mask m)
 #endif
 }
 
-INLINE mask finite(real x) { return absolute(x) <= fill(1.7976931348623157e308); }
+INLINE mask is_finite(real x) { return absolute(x) <= fill(1.7976931348623157e308); }
 
 /* What is known of a row in part is not known: all its numbers become NaN. */
 INLINE void whole_or_nan(real *numbers, int count)
 {
     mask known = fill_mask(-1);
-    for (int k = 0; k < count; k++) known &= finite(numbers[k]);
+    for (int k = 0; k < count; k++) known &= is_finite(numbers[k]);
     for (int k = 0; k < count; k++) numbers[k] = select(known, numbers[k], fill(NAN));
 }
 

@@ -9,6 +9,7 @@ def main() -> None:
     """Run the command line; `pkmcal` on the shell."""
     interrupt.ends_at_once()
     import io
+    import os
     import signal
     import sys
     import warnings
@@ -17,6 +18,8 @@ def main() -> None:
 
     if hasattr(signal, "SIGPIPE"):
         signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # `pkmcal … | head` ends as others do
+    if sys.stderr is None:  # closed, as services have it, and pythonw
+        sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # a terminal without σ gets "?"
     try:

@@ -67,6 +67,8 @@ def print_page(page: Path, to: Path) -> None:
             said = done.stderr.strip().splitlines()
         except subprocess.TimeoutExpired:
             said = [f"no answer within {_PATIENCE} s"]
+        except OSError as error:
+            said = [str(error)]
     if not to.exists():
         why = said[-1] if said else "it does not say why"
         raise ArgumentError(f"pdf: {by} printed nothing: {why}")
