@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import signal
 import time
+from contextlib import suppress
 from types import FrameType
 
 _NAMES = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")  # the last is that of a console of Windows
@@ -82,10 +83,8 @@ def _handle(handler: signal._HANDLER) -> None:
 
 
 def _end(number: int, frame: FrameType | None) -> None:
-    try:
+    with suppress(OSError):  # there may be no stderr
         os.write(2, f"pkmcal: {_said(number)}\n".encode())
-    except OSError:  # there is no stderr
-        pass
     os._exit(128 + number)
 
 
