@@ -20,6 +20,7 @@ from pkmcal.files import reading
 from pkmcal.files.csv_table import Table
 from pkmcal.files.reading import LONGEST_NAME, MOST_COLUMNS
 from pkmcal.files.toml_lines import MOST_NESTED, Source
+from pkmcal.files.text_rows import TextRows
 from pkmcal.files.xlsx_rows import xlsx_rows
 
 HEXAPOD = (Path(pk.__file__).parent / "builtin/machines/hexapod.toml").read_text("utf-8")
@@ -254,7 +255,7 @@ def test_bytes_changed_anywhere_in_a_workbook_give_rows_or_one_error(
             data[at] = random.integers(256)
         path.write_bytes(data)
         try:
-            assert isinstance(xlsx_rows(path), list)
+            assert isinstance(xlsx_rows(path), TextRows)
         except pk.FileError:
             refusals += 1
     assert 30 < refusals < 300

@@ -30,7 +30,9 @@ def read(folder: Path, points: str, log: str | None = None, join: str = "auto") 
 def test_a_moment_is_the_same_on_every_clock(moments: list[tuple], form: str) -> None:
     at = [when.replace(tzinfo=timezone.utc) for when, _ in moments]
     zones = [timezone(timedelta(minutes=ahead)) for _, ahead in moments]
-    found = seconds([when.astimezone(zone).strftime(form) for when, zone in zip(at, zones)])
+    found = seconds(
+        [when.astimezone(zone).strftime(form) for when, zone in zip(at, zones, strict=True)]
+    )
     assert isinstance(found, Times) and found.in_utc
     expected = [(when - at[0]).total_seconds() for when in at]
     np.testing.assert_allclose(found.seconds - found.seconds[0], expected, rtol=0, atol=2e-6)
