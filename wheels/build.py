@@ -62,6 +62,11 @@ def objects(name: str, target: Target) -> list[Path]:
     os.environ["CC"] = " ".join([*ZIG, "cc", "-target", target.triple])  # whose flags are asked for
     flags = [*core.flags(), "-fPIC", "-fno-sanitize=all", "-Icsrc", "-Igenerated"]
     newest = max(path.stat().st_mtime for path in _sources())
+    used = folder / "flags"
+    if not used.exists() or used.read_text() != " ".join(flags):
+        for old in folder.glob("*.o"):
+            old.unlink()
+        used.write_text(" ".join(flags))
     jobs = []
     for source in sorted(core.CSRC.glob("*.c")):
         made = folder / f"{source.stem}.o"

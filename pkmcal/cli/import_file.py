@@ -47,7 +47,7 @@ def import_file(
     names = ["robot.toml"] if measured is None else ["robot.toml", table]
     output = Output(out, names, read, force)
     with output.draft() as draft:
-        (draft / "robot.toml").write_text(read.comment() + printer.text, encoding="utf-8")
+        (draft / "robot.toml").write_bytes((read.comment() + printer.text).encode())
         if measured is not None:
             units = reading_units(printer.robot)
             write_measurements(measured, draft / table, read.comment(), units)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import signal
@@ -83,6 +84,20 @@ def test_the_module_is_the_command(tmp_path: Path) -> None:
     said = subprocess.run([sys.executable, "-m", "pkmcal", "machines"], capture_output=True)
     assert (said.returncode, said.stderr) == (0, b"")
     assert said.stdout.decode() == process("machines").stdout
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "cp1252", "cp437", "utf-8"])
+def test_json_says_all_whatever_the_encoding_of_stdout(encoding: str) -> None:
+    """As where Windows sends it into a file or a pipe."""
+    name = "Prüfstand σ₁ 机器 😀"
+    path = hostile(name)
+    done = subprocess.run(
+        [*PROGRAM, "check", str(path), "--json"],
+        capture_output=True,
+        env={**os.environ, "PYTHONIOENCODING": encoding},
+    )
+    said = json.loads(done.stdout.decode(encoding))
+    assert (done.returncode, said["robot"]["name"]) == (0, name)
 
 
 def test_a_reader_that_leaves_ends_the_command_as_it_ends_others() -> None:

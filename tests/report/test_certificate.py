@@ -287,6 +287,17 @@ def test_a_pdf_that_fails_leaves_the_report(
     assert written == {path.name: path.read_bytes() for path in (tmp_path / "usual").iterdir()}
 
 
+def test_a_browser_is_found_where_its_system_has_it(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Applications of macOS and Windows are not on the path."""
+    broken_browser(tmp_path)
+    monkeypatch.setenv("PATH", "")
+    place = str(tmp_path / "chromium")
+    monkeypatch.setattr(pdf, "_APPLICATIONS", (str(tmp_path / "absent"), place))
+    assert pdf.browser() == place
+
+
 def test_a_browser_that_prints_nothing_is_named(tmp_path: Path) -> None:
     broken_browser(tmp_path)
     with pytest.MonkeyPatch.context() as patch:
