@@ -3,11 +3,11 @@
     python -m wheels.build                 # every target, into dist/
     python -m wheels.build windows-x86_64  # one
 
-zig is clang with the headers and libraries of the systems; the PyPI package `ziglang` has it. Python's
-own headers are those of the Python that runs this, but for pyconfig.h, which is of a system: that of
-`include/` states what extensions of the stable ABI need. Windows wants to know at linking time what
-python3.dll offers: the names are those of the package `abi3info`, a reading of CPython's
-Misc/stable_abi.toml.
+zig is clang with the headers and libraries of the systems; the PyPI package `ziglang` has it.
+Python's own headers are those of the Python that runs this, but for pyconfig.h, which is of a
+system: that of `include/` states what extensions of the stable ABI need. Windows wants to know at
+linking time what python3.dll offers: the names are those of the PyPI package `abi3info`, a reading
+of CPython's Misc/stable_abi.toml.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from wheels.targets import TARGETS, Target
 ROOT = Path(__file__).resolve().parents[1]
 BUILT = ROOT / "build" / "wheels"
 DIST = ROOT / "dist"
-ZIG = (sys.executable, "-m", "ziglang")
+ZIG = (Path(sys.executable).as_posix(), "-m", "ziglang")  # as shells take it
 PYTHON = "cp310-abi3"
 _TIME = (1980, 1, 1, 0, 0, 0)  # of the files in a wheel: the same sources give the same bytes
 
@@ -61,6 +61,8 @@ def objects(name: str, target: Target) -> list[Path]:
     folder.mkdir(parents=True, exist_ok=True)
     os.environ["CC"] = " ".join([*ZIG, "cc", "-target", target.triple])  # whose flags are asked for
     flags = [*core.flags(), "-fPIC", "-fno-sanitize=all", "-Icsrc", "-Igenerated"]
+    if len(core.isas()) != (3 if target.processor == "x86_64" else 1):
+        raise SystemExit(f"{name}: {os.environ['CC']} compiles nothing: pip install ziglang")
     newest = max(path.stat().st_mtime for path in _sources())
     used = folder / "flags"
     if not used.exists() or used.read_text() != " ".join(flags):

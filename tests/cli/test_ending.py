@@ -96,7 +96,8 @@ def test_json_says_all_whatever_the_encoding_of_stdout(encoding: str) -> None:
         capture_output=True,
         env={**os.environ, "PYTHONIOENCODING": encoding},
     )
-    said = json.loads(done.stdout.decode(encoding))
+    written = "utf-8" if encoding == "ascii" else encoding  # typer mistrusts ASCII
+    said = json.loads(done.stdout.decode(written))
     assert (done.returncode, said["robot"]["name"]) == (0, name)
 
 
