@@ -2,8 +2,8 @@
 
     python -m wheels.check dist/*.whl
 
-Each file has the checksum that RECORD states, all wheels carry the same but the extension, and that is
-of its processor, offers Python one function, and asks for nothing but Python, the C library, and
+Each file has the checksum that RECORD states, all wheels carry the same but the extension, and that
+is of its processor, offers Python one function, and asks for nothing but Python, the C library, and
 systems as old as its tag says. `abi3audit` looks whether Python's stable ABI has what it asks for.
 """
 
@@ -21,6 +21,7 @@ import zipfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from wheels.targets import TARGETS, Target
 
@@ -100,9 +101,9 @@ def elf(content: bytes) -> Extension:
     from elftools.elf.dynamic import DynamicSection
     from elftools.elf.elffile import ELFFile
 
-    file = ELFFile(io.BytesIO(content))
+    file: Any = ELFFile(io.BytesIO(content))
     dynamic = next(s for s in file.iter_sections() if isinstance(s, DynamicSection))
-    libraries = frozenset(tag.needed for tag in dynamic.iter_tags("DT_NEEDED"))
+    asked = frozenset(str(vars(tag)["needed"]) for tag in dynamic.iter_tags("DT_NEEDED"))
     symbols = list(file.get_section_by_name(".dynsym").iter_symbols())
     offered = {
         s.name
@@ -110,13 +111,13 @@ def elf(content: bytes) -> Extension:
         if s["st_shndx"] != "SHN_UNDEF" and s["st_info"]["bind"] != "STB_LOCAL"
     }
     versions = [
-        tuple(map(int, each.name.removeprefix("GLIBC_").split(".")[:2]))
+        (int(major), int(minor))
         for _, needed in file.get_section_by_name(".gnu.version_r").iter_versions()
         for each in needed
-        if each.name.startswith("GLIBC_")
+        for major, minor in re.findall(r"^GLIBC_([0-9]+)\.([0-9]+)", each.name)
     ]
     (processor,) = struct.unpack_from("<H", content, 18)
-    return Extension(processor, libraries, frozenset(offered), max(versions))
+    return Extension(processor, asked, frozenset(offered), max(versions))
 
 
 def pe(content: bytes) -> Extension:

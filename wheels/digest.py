@@ -3,9 +3,9 @@
     python -m wheels.digest 1000           # inputs of chance, each for one call of the interface
     python -m wheels.digest 1000 windows-x86_64
 
-The program of `tests/fuzz/digest.c` is linked with the very objects of a wheel and run here: as it is,
-under QEMU, under Wine. On x86-64 it runs each call with every instruction set and compares them.
-What runs nowhere here is named. `make wheels` runs it.
+The program of `tests/fuzz/digest.c` is linked with the very objects of a wheel and run here: as it
+is, under QEMU, under Wine. On x86-64 it runs each call with every instruction set and compares
+them. What runs nowhere here is named. `make wheels` runs it.
 """
 
 from __future__ import annotations
