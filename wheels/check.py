@@ -26,6 +26,7 @@ from typing import Any
 from wheels.targets import TARGETS, Target
 
 OFFERED = {"PyInit__core"}
+_LINKERS = {"_mh_dylib_header", "__dso_handle"}  # names that linkers of macOS add
 LIBRARIES = {  # that systems have
     "linux": r"lib(c|m|pthread|dl)\.so\.[0-9]|ld-linux.*",
     "windows": r"python3\.dll|KERNEL32\.dll|ntdll\.dll|api-ms-win-crt-[a-z]+-l1-1-0\.dll",
@@ -165,7 +166,9 @@ def _macho_offered(content: bytes, table: int, count: int, names: int, _: int) -
     for k in range(count):
         name, kind, _, _, _ = struct.unpack_from("<IBBHQ", content, table + 16 * k)
         if kind & 0x1 and not kind & 0x10 and kind & 0xE == 0xE and not kind & 0xE0:
-            yield content[names + name :].split(b"\0", 1)[0].decode().removeprefix("_")
+            text = content[names + name :].split(b"\0", 1)[0].decode().removeprefix("_")
+            if text not in _LINKERS:
+                yield text
 
 
 if __name__ == "__main__":
