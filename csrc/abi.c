@@ -1,5 +1,8 @@
 /* What needs no lanes: names, the best ISA, checks of what calls are given, and small loops. */
 #include "pkmcal.h"
+#ifdef __x86_64__
+#include <cpuid.h>
+#endif
 
 enum { MOST_PARTICLES = 1 << 24 }; /* and dimensions: the size of their state is a number of 64 bits */
 
@@ -12,20 +15,32 @@ const char *pkm_map_free(void) { return MAP_FREE; }
 const char *pkm_row_calls(void) { return ROW_CALLS; }
 int pkm_state_size(void) { return MAX_STATE; }
 
+#ifdef __x86_64__
+/* What x86-64-v3 and x86-64-v4 add, as the bits that the instruction cpuid gives: of its leaf 1 (ecx),
+ * its leaf 7 (ebx) and its leaf 0x80000001 (ecx). Asked for here and not by __builtin_cpu_supports, for
+ * which some toolchains link a table that nobody fills: every processor is then the oldest. */
+enum { LEAF_1 = bit_FMA | bit_MOVBE | bit_F16C | bit_OSXSAVE | bit_AVX, LEAF_7 = bit_AVX2 | bit_BMI | bit_BMI2 };
+#define LEAF_7_WIDE ((unsigned)(bit_AVX512F | bit_AVX512DQ | bit_AVX512BW | bit_AVX512CD) | bit_AVX512VL)
+enum { HALVES = 0x06, WHOLE = 0xe0 }; /* of XCR0: registers of 256 and of 512 bits, which the system saves */
+
+static int has(unsigned word, unsigned bits) { return (word & bits) == bits; }
+
 int pkm_best_isa(void)
 {
-#ifdef __x86_64__
-    __builtin_cpu_init();
-    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq")
-        && __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512cd")
-        && __builtin_cpu_supports("avx512vl"))
-        return 2;
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")
-        && __builtin_cpu_supports("bmi") && __builtin_cpu_supports("bmi2"))
-        return 1;
+    unsigned a, b, leaf_1, d, leaf_7, c, more, saved;
+    if (!__get_cpuid(1, &a, &b, &leaf_1, &d) || !has(leaf_1, LEAF_1)) return 0;
+    if (!__get_cpuid_count(7, 0, &a, &leaf_7, &c, &d) || !has(leaf_7, LEAF_7)) return 0;
+    if (!__get_cpuid(0x80000001, &a, &b, &more, &d) || !has(more, bit_LZCNT)) return 0;
+    __asm__("xgetbv" : "=a"(saved), "=d"(d) : "c"(0));
+    if (!has(saved, HALVES)) return 0;
+#ifdef __APPLE__
+    saved |= WHOLE; /* from the first use on */
 #endif
-    return 0;
+    return has(leaf_7, LEAF_7_WIDE) && has(saved, WHOLE) ? 2 : 1;
 }
+#else
+int pkm_best_isa(void) { return 0; }
+#endif
 
 static int free_coordinates(const pkm_machine *machine)
 {

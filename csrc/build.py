@@ -8,6 +8,7 @@ import re
 import shlex
 import subprocess
 import sysconfig
+import tempfile
 from pathlib import Path
 
 from cffi import FFI
@@ -50,13 +51,16 @@ def _known(flag: str) -> bool:
 
 
 def _compiles(text: str, *given: str) -> bool:
-    """Whether the C compiler takes this text."""
+    """Whether the C compiler takes this text: a file that is compiled, which every compiler can."""
     compiler = shlex.split(os.environ.get("CC") or sysconfig.get_config_var("CC") or "cc")
-    trial = [*compiler, "-Werror", *given, "-fsyntax-only", "-x", "c", "-"]
-    try:
-        return subprocess.run(trial, input=text.encode(), capture_output=True).returncode == 0
-    except OSError:
-        return False  # no compiler: the build itself says so
+    with tempfile.TemporaryDirectory() as folder:
+        source = Path(folder, "trial.c")
+        source.write_text(text, encoding="utf-8")
+        trial = [*compiler, "-Werror", *given, "-c", str(source), "-o", f"{folder}/trial.o"]
+        try:
+            return subprocess.run(trial, capture_output=True).returncode == 0
+        except OSError:
+            return False  # no compiler: the build itself says so
 
 
 def isas() -> tuple[str, ...]:

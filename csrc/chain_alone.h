@@ -56,7 +56,7 @@ SHARED mask chain_assemble(const pkm_chains *machine, int l, const chain_numbers
             if (!slides) x[c] *= 1.0 / machine->length;
             if (!slides) turn = larger(turn, absolute(x[c]));
         }
-        const mask usable = finite(longest) & running;
+        const mask usable = is_finite(longest) & running;
         const real share = 1.0 / larger(turn * (1.0 / MAX_TURN), fill(1.0));
         for (int c = 0; c < count; c++) {
             const int joint = machine->member[first + movable[c]], a = machine->actuator[joint];

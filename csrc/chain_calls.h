@@ -110,9 +110,9 @@ SHARED mask chain_guess(const pkm_chains *machine, const chain_numbers *numbers,
         chain_choose(machine, other & far & ~good, start->second.theta, to, at->theta, start->from);
     }
     for (int c = 0; c < machine->passive; c++)
-        at->theta[c] = select(finite(at->theta[c]), at->theta[c], fill(0.0));
+        at->theta[c] = select(is_finite(at->theta[c]), at->theta[c], fill(0.0));
     for (int a = 0; a < machine->actuators; a++)
-        start->from[a] = select(finite(start->from[a]), start->from[a], fill(0.0));
+        start->from[a] = select(is_finite(start->from[a]), start->from[a], fill(0.0));
     return machine->tail < machine->actuators ? fill_mask(-1) : other;
 }
 
@@ -277,10 +277,10 @@ int CALL(chain_forward)(const pkm_chains *machine, ptrdiff_t n, const double *ge
         }
         const mask within = chain_within(machine, drive);
         chain_unwind(machine, start.from, drive);
-        for (int a = 0; a < machine->actuators; a++) valid &= finite(lane_q[a]);
-        for (int k = 0; k < 6; k++) valid &= finite(begin[k]);
+        for (int a = 0; a < machine->actuators; a++) valid &= is_finite(lane_q[a]);
+        for (int k = 0; k < 6; k++) valid &= is_finite(begin[k]);
         for (int k = 0; geometry_stride && k < machine->numbers; k++)
-            valid &= finite(gather(geometry + k, geometry_stride, row));
+            valid &= is_finite(gather(geometry + k, geometry_stride, row));
         const mask usable = valid & within;
         chain_solve(machine, &numbers, &start.at, &predicted, start.from, drive, usable, &answer.at,
                     &answer.status, &answer.iterations, &answer.residual);
@@ -336,7 +336,7 @@ SHARED void chain_agree(const pkm_chains *machine, const chain_numbers *numbers,
     real from[6];
     memcpy(from, pose, sizeof from);
     for (int attempt = 0; attempt < 2; attempt++) {
-        const mask open = ~(*missed <= fill(AGREED * machine->size)) & finite(pose[0]);
+        const mask open = ~(*missed <= fill(AGREED * machine->size)) & is_finite(pose[0]);
         chain_start start = {0};
         chain_prediction predicted;
         chain_answer answer;

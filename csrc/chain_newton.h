@@ -269,7 +269,7 @@ SHARED mask chain_iterate(const pkm_chains *machine, const chain_numbers *number
                                       : chain_matrix_at(machine, numbers, at, to, &matrix);
             const mask still = (last <= settled) & ~falling; /* steps of rounding */
             const mask exact = next <= exactly;
-            const mask open = machine->over ? ~finite(worst) : ~(worst <= select(still, loose, closed));
+            const mask open = machine->over ? ~is_finite(worst) : ~(worst <= select(still, loose, closed));
             const mask done = going & ~open & matrix.known & (exact | still);
             *known = select_mask(going, matrix.known, *known);
             *residual = select(going, worst, *residual);
@@ -278,7 +278,7 @@ SHARED mask chain_iterate(const pkm_chains *machine, const chain_numbers *number
             going &= ~done;
             if (!any(going)) break;
             chain_correct(machine, &matrix, at, &step);
-            const mask usable = finite(step.longest) & going;
+            const mask usable = is_finite(step.longest) & going;
             chain_move(machine, &step, usable, at);
             *iterations = select(going, *iterations + 1.0, *iterations);
             falling = select_mask(going, step.longest <= FALLING * last, falling);
@@ -336,7 +336,7 @@ SHARED void chain_begin(const pkm_chains *machine, const chain_prediction *start
         step.longest = larger(step.longest, absolute(step.turns[c]));
         if (!machine->prismatic[i]) step.turn = larger(step.turn, absolute(step.turns[c]));
     }
-    chain_move(machine, &step, running & finite(step.longest), at);
+    chain_move(machine, &step, running & is_finite(step.longest), at);
 }
 
 #endif

@@ -214,7 +214,7 @@ INLINE real chain_misses(const pkm_chains *machine, int l, const chain_numbers *
         for (int i = 0; i < 9; i++) trace += end->R[i] * R[i];
         worst = select(trace > fill(1.0), worst, fill(INFINITY));
     }
-    return select(finite(worst), worst, fill(INFINITY));
+    return select(is_finite(worst), worst, fill(INFINITY));
 }
 
 /* Cholesky factor of what the joints yield at the end: each gives way along and about every axis,

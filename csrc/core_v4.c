@@ -1,6 +1,9 @@
 /* The core for x86-64-v4 (AVX-512): 512-bit lanes. Empty elsewhere. */
 #include "pkmcal.h"
 #ifdef __x86_64__
+#if defined _WIN32 && !defined __clang__
+#error "gcc misaligns vectors on the stack of Windows (GCC bug 54412): use clang, as `make wheels` does"
+#endif
 #ifdef __clang__
 #pragma clang attribute push(__attribute__((target("arch=x86-64-v4"))), apply_to = function)
 #else

@@ -181,12 +181,12 @@ int CALL(pose_fit)(ptrdiff_t n, int unknowns, const int64_t *first, const int64_
                 real sum = fill(0.0);
                 for (ptrdiff_t k = 0; k <= b && k < rank; k++)
                     sum += triangle(u, vectors, diagonal, k, a) * triangle(u, vectors, diagonal, k, b);
-                known &= finite(sum);
+                known &= is_finite(sum);
                 put(sum, A, a * u + b);
             }
             for (ptrdiff_t k = 0; k <= a && k < rank; k++)
                 pull += triangle(u, vectors, diagonal, k, a) * at(column, k);
-            known &= finite(pull);
+            known &= is_finite(pull);
             trace += at(A, a * (u + 1));
             put(-pull, x, a);
         }

@@ -40,10 +40,10 @@ SHARED void load_rows(const forward_call *call, const limb_numbers *limb, const 
 SHARED mask invalid_rows(const forward_call *call, const limb_numbers *limb, const rows_in *in)
 {
     mask valid = fill_mask(-1);
-    for (int a = 0; a < call->machine->actuators; a++) valid &= finite(in->q[a]);
-    for (int k = 0; k < 6; k++) valid &= finite(in->guess[k]);
+    for (int a = 0; a < call->machine->actuators; a++) valid &= is_finite(in->q[a]);
+    for (int k = 0; k < 6; k++) valid &= is_finite(in->guess[k]);
     for (int i = 0; i < call->machine->limbs; i++)
-        for (int s = 0; s < SLOTS; s++) valid &= finite(limb[i].g[s]);
+        for (int s = 0; s < SLOTS; s++) valid &= is_finite(limb[i].g[s]);
     return ~valid;
 }
 

@@ -73,7 +73,7 @@ INLINE void jacobian_block(int map, const pkm_machine *machine, const limb_numbe
         mask reachable = fill_mask(-1);
         const int a = machine->actuator[i];
         real own = limb_inverse(machine, i, &limb[i], R, p, fill(machine->near[i]));
-        own = select(finite(own), own, fill(NAN));
+        own = select(is_finite(own), own, fill(NAN));
         sphere_of_numbers(machine->driver[i], &limb[i], &sphere);
         sphere_at(machine->driver[i], &limb[i], own, &sphere, &reachable);
         FN(sphere_row)(R, p, limb[i].g + PLATFORM_X, sphere.c, sphere.rho * sphere.rho, &phi, omega, v);
@@ -133,7 +133,7 @@ INLINE int pose_response(int map, const pkm_machine *machine, const FN(limb_sphe
     const int m = map_m(map);
     real X[6 * PKM_MAX_ROWS];
     const int rows = step_response(map, machine, sphere, state, X);
-    const mask known = finite(X[0]);
+    const mask known = is_finite(X[0]);
     for (int r = 0; r < rows; r++) {
         real step[6], rates[6];
         for (int j = 0; j < m; j++) step[j] = X[j * rows + r];

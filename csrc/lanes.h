@@ -13,7 +13,7 @@
 #include <string.h>
 
 #include "pkmcal.h"
-#ifdef __x86_64__
+#ifdef __SSE2__
 #include <immintrin.h>
 #endif
 
@@ -34,9 +34,9 @@ typedef int32_t narrow_mask __attribute__((vector_size(4 * JOINED * LANES)));
 
 INLINE wide root_wide(wide x)
 {
-#if LANES == 8 && defined(__AVX512F__)
+#if LANES == 8
     return (wide)_mm512_sqrt_pd((__m512d)x);
-#elif LANES == 4 && defined(__AVX__)
+#elif LANES == 4
     return (wide)_mm256_sqrt_pd((__m256d)x);
 #elif LANES == 2 && defined(__SSE2__)
     return (wide)_mm_sqrt_pd((__m128d)x);
@@ -48,9 +48,9 @@ INLINE wide root_wide(wide x)
 
 INLINE narrow root_narrow(narrow x)
 {
-#if LANES == 8 && defined(__AVX512F__)
+#if LANES == 8
     return (narrow)_mm512_sqrt_ps((__m512)x);
-#elif LANES == 4 && defined(__AVX__)
+#elif LANES == 4
     return (narrow)_mm256_sqrt_ps((__m256)x);
 #elif LANES == 2 && defined(__SSE2__)
     return (narrow)_mm_sqrt_ps((__m128)x);
@@ -62,9 +62,9 @@ INLINE narrow root_narrow(narrow x)
 
 INLINE wide select_wide(wide_mask m, wide yes, wide no)
 {
-#if LANES == 8 && defined(__AVX512DQ__)
+#if LANES == 8
     return (wide)_mm512_mask_blend_pd(_mm512_movepi64_mask((__m512i)m), (__m512d)no, (__m512d)yes);
-#elif LANES == 4 && defined(__AVX__)
+#elif LANES == 4
     return (wide)_mm256_blendv_pd((__m256d)no, (__m256d)yes, (__m256d)m);
 #else
     return (wide)((m & (wide_mask)yes) | (~m & (wide_mask)no));
@@ -80,7 +80,7 @@ INLINE narrow select_narrow(narrow_mask m, narrow yes, narrow no)
  * any number: a maximum that dropped it would call a failed row good. */
 INLINE wide larger_wide(wide a, wide b)
 {
-#if LANES == 8 && defined(__AVX512F__)
+#if LANES == 8
     return (wide)_mm512_max_epi64((__m512i)a, (__m512i)b);
 #else
     return select_wide((wide_mask)a > (wide_mask)b, a, b);
@@ -89,7 +89,7 @@ INLINE wide larger_wide(wide a, wide b)
 
 INLINE narrow larger_narrow(narrow a, narrow b)
 {
-#if LANES == 8 && defined(__AVX512F__)
+#if LANES == 8
     return (narrow)_mm512_max_epi32((__m512i)a, (__m512i)b);
 #else
     return select_narrow((narrow_mask)a > (narrow_mask)b, a, b);
@@ -99,10 +99,10 @@ INLINE narrow larger_narrow(narrow a, narrow b)
 /* JOINED wide blocks, the first and the last, rounded to one narrow block. */
 INLINE narrow join(wide first, wide last)
 {
-#if LANES == 8 && defined(__AVX512DQ__)
+#if LANES == 8
     const __m512 low = _mm512_castps256_ps512(_mm512_cvtpd_ps((__m512d)first));
     return (narrow)_mm512_insertf32x8(low, _mm512_cvtpd_ps((__m512d)last), 1);
-#elif LANES == 4 && defined(__AVX__)
+#elif LANES == 4
     const __m256 low = _mm256_castps128_ps256(_mm256_cvtpd_ps((__m256d)first));
     return (narrow)_mm256_insertf128_ps(low, _mm256_cvtpd_ps((__m256d)last), 1);
 #elif LANES == 2 && defined(__SSE2__)
@@ -120,10 +120,10 @@ INLINE narrow join(wide first, wide last)
 /* Wide block 0 or 1 of a narrow one, exactly. */
 INLINE wide part(narrow x, int which)
 {
-#if LANES == 8 && defined(__AVX512DQ__)
+#if LANES == 8
     return (wide)_mm512_cvtps_pd(which ? _mm512_extractf32x8_ps((__m512)x, 1)
                                        : _mm512_castps512_ps256((__m512)x));
-#elif LANES == 4 && defined(__AVX__)
+#elif LANES == 4
     return (wide)_mm256_cvtps_pd(which ? _mm256_extractf128_ps((__m256)x, 1)
                                        : _mm256_castps256_ps128((__m256)x));
 #elif LANES == 2 && defined(__SSE2__)
@@ -166,9 +166,9 @@ INLINE mask select_mask(mask m, mask yes, mask no) { return (m & yes) | (~m & no
 
 INLINE int any(mask m)
 {
-#if LANES == 8 && defined(__AVX512DQ__)
+#if LANES == 8
     return _mm512_movepi64_mask((__m512i)m) != 0;
-#elif LANES == 4 && defined(__AVX2__)
+#elif LANES == 4
     return _mm256_movemask_pd((__m256d)m) != 0;
 #elif LANES == 2 && defined(__SSE2__)
     return _mm_movemask_pd((__m128d)m) != 0;
@@ -179,13 +179,13 @@ INLINE int any(mask m)
 #endif
 }
 
-INLINE mask finite(real x) { return absolute(x) <= fill(1.7976931348623157e308); }
+INLINE mask is_finite(real x) { return absolute(x) <= fill(1.7976931348623157e308); }
 
 /* What is known of a row in part is not known: all its numbers become NaN. */
 INLINE void whole_or_nan(real *numbers, int count)
 {
     mask known = fill_mask(-1);
-    for (int k = 0; k < count; k++) known &= finite(numbers[k]);
+    for (int k = 0; k < count; k++) known &= is_finite(numbers[k]);
     for (int k = 0; k < count; k++) numbers[k] = select(known, numbers[k], fill(NAN));
 }
 

@@ -55,7 +55,7 @@ INLINE void newton(int map, const pkm_machine *machine, const FN(limb_sphere) *l
             longest = larger(longest, absolute(fresh[j]));
             if (map_is_angle(map, j)) turn = larger(turn, absolute(fresh[j]) * inverse_length);
         }
-        const mask solvable = finite(longest);
+        const mask solvable = is_finite(longest);
         const mask known = trial_pivot > fill(LEAST_PIVOT);
         const mask holds = rows > m ? solvable : trial_worst <= closed;
         const mask done = better & holds & known & (longest <= settled);

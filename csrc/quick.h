@@ -87,7 +87,7 @@ INLINE void predict(int map, const pkm_machine *machine, const limb_numbers *lim
         FN(substitute)(m, 1, A, X);
         for (int j = 0; j < m; j++) {
             slope[j * actuators + a] -= X[0][j];
-            usable &= finite(X[0][j]);
+            usable &= is_finite(X[0][j]);
         }
     }
     for (int k = 0; k < m * m; k++) factors[k] = join(A[0][k], A[0][k]);

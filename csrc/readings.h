@@ -23,7 +23,7 @@ INLINE real actuator_row(int map, const pkm_machine *machine, int i, const limb_
     mask reachable = fill_mask(-1);
     FN(limb_drive)(read, limb->g, &about);
     const real own = limb_inverse(machine, i, limb, R, p, about);
-    const mask reaches = finite(own);
+    const mask reaches = is_finite(own);
     const real at = select(reaches, own, read);
     sphere_of_numbers(machine->driver[i], limb, &sphere);
     sphere_at(machine->driver[i], limb, at, &sphere, &reachable);

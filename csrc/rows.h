@@ -34,7 +34,7 @@ INLINE void scatter(real x, double *column, ptrdiff_t stride, const ptrdiff_t *r
 }
 
 /* A tile of LANES rows by LANES numbers, where turning it beats gathering number by number. */
-#if LANES == 8 && defined(__AVX512F__)
+#if LANES == 8
 #define TILE 8
 #define LEAST_PART 3 /* numbers of a row that are worth a tile */
 typedef __m512d tile_row;
@@ -67,7 +67,7 @@ INLINE void transpose(tile_row tile[8])
         tile[4 + j] = _mm512_shuffle_f64x2(four[j], four[4 + j], 0xdd);
     }
 }
-#elif LANES == 4 && defined(__AVX__)
+#elif LANES == 4
 #define TILE 4
 #define LEAST_PART 4
 typedef __m256d tile_row;

@@ -288,7 +288,7 @@ INLINE void scatter_column(const motion *view, const real w[3], const real v[3],
 /* Where the arm cannot be said to be there are no derivatives either: NaN, as the tool. */
 INLINE void drop_unknown(const motion *T, double *rows, int width, const ptrdiff_t *row, int count)
 {
-    const mask known = finite(T->p[0]) & finite(T->p[1]) & finite(T->p[2]) & finite(T->R[0]);
+    const mask known = is_finite(T->p[0]) & is_finite(T->p[1]) & is_finite(T->p[2]) & is_finite(T->R[0]);
     if (!any(~known)) return;
     for (int l = 0; l < count; l++)
         for (int k = 0; !known[l] && k < width; k++) rows[row[l] * width + k] = NAN;

@@ -149,6 +149,20 @@ except SystemExit:
     assert "rich" not in loaded - needed  # of bars on a terminal
 
 
+def test_a_type_checker_finds_the_package_where_it_is_installed(tmp_path: Path) -> None:
+    """It looks at folders and runs no code, such as the finder of an editable install."""
+    pytest.importorskip("mypy")
+    (tmp_path / "script.py").write_text("import pkmcal\nimport no_such_package\n")
+    done = subprocess.run(
+        [sys.executable, "-m", "mypy", "--follow-imports=skip", "--no-incremental", "script.py"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+    )
+    found = re.findall(r"script\.py:(\d): error", done.stdout)
+    assert found == ["2"], f"make installs a file that says where it is: {done.stdout}"
+
+
 def test_version_is_stated_once() -> None:
     files = [ROOT / "pyproject.toml", ROOT / "setup.py"]
     for folder in ("pkmcal", "derive", "csrc", "generated"):

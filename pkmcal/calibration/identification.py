@@ -256,7 +256,8 @@ class Identification(Solution, Result):
         Raises
         ------
         ValueError
-            A mistake in the file of the certificate; no Chromium for the PDF.
+            A mistake in the file of the certificate; no Chromium for the PDF; one that prints
+            nothing, when the other files have been written.
         OSError
             The folder cannot be written.
         """

@@ -239,7 +239,7 @@ def calibrate(
     urdf = isinstance(given, pk.SerialArm) and given.source is not None
     names = ["robot.toml", "residuals.png", *["robot.urdf"] * urdf]
     output = None if out is None else Output(out, names, read, force)
-    reported = None if report is None else _report_files(report, read, force, pdf)
+    reported, printed = (None, None) if report is None else _report(report, read, force, pdf)
     if report is None and (certificate is not None or pdf):
         option = "--pdf" if certificate is None else "--certificate"
         raise ArgumentError(f"{option}: it is part of the report, --report DIR")
@@ -284,7 +284,7 @@ def calibrate(
                 found.robot.save_urdf(draft / "robot.urdf")
     if reported is not None:
         with progress("report"), reported.draft() as draft:
-            found.report(draft, read.contents(), certificate=stated, pdf=pdf)
+            found.report(draft, read.contents(), certificate=stated)
             _save(found, draft / "robot.toml", read, robot)
     if json:
         say(as_json(found, "parameters", "correlations", schema="calibrate"))
@@ -298,24 +298,40 @@ def calibrate(
                 say(f"URDF with the joint errors in its origins: {output.paths[2]}")
         if reported is not None:
             say(f"\nreport: {reported.paths[0]}")
-            if pdf:
-                say(f"the same to print: {reported.paths[-1]}")
         written = [each for each in (reported, output) if each is not None]
         if written and isinstance(found.robot, pk.Robot) and found.robot.model.controller:
             robot_file = next(path for path in written[0].paths if path.name == "robot.toml")
             say(f"for its firmware: {found.robot.model.controller.command(str(robot_file))}")
-    return 0 if found.verdict.state == "calibrated" and not doubts else 1
+    complete = printed is None or _printed(printed, json)
+    return 0 if found.verdict.state == "calibrated" and not doubts and complete else 1
 
 
-def _report_files(folder: Path, read: Inputs, force: bool, pdf: bool) -> Output:
-    """Where the report goes; that nothing prints a PDF is said before the work."""
+def _report(folder: Path, read: Inputs, force: bool, pdf: bool) -> tuple[Output, Output | None]:
+    """Where the report and its PDF go; that nothing prints one is said before the work."""
     # they import all that a report needs: only if there is one
     from pkmcal.report.pdf import browser
     from pkmcal.report.report import FILES, PDF
 
     if pdf:
         browser()
-    return Output(folder, [*FILES, *[PDF] * pdf], read, force)
+    return Output(folder, FILES, read, force), Output(folder, [PDF], read, force) if pdf else None
+
+
+def _printed(output: Output, json: bool) -> bool:
+    """Print the report that has been written; whether that could be done."""
+    from pkmcal.report.pdf import print_page
+    from pkmcal.report.report import FILES
+
+    (pdf,) = output.paths
+    try:
+        with progress("PDF"), output.draft() as draft:
+            print_page(pdf.with_name(FILES[0]), draft / pdf.name)
+    except ArgumentError as error:
+        say(f"pkmcal: {error}; the report itself is complete", err=True)
+        return False
+    if not json:
+        say(f"the same to print: {pdf}")
+    return True
 
 
 def _checked_statement(certificate: Path, read: Inputs) -> Input:

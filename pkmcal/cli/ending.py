@@ -1,7 +1,8 @@
 """How a command ends: the one place where whatever was raised becomes one line and an exit code.
 
 Codes: 0 done, 1 done but not to be trusted, 2 nothing done, because of what was given or because a
-file cannot be read or written, 3 nothing done, because of a mistake in this program, 130 stopped.
+file cannot be read or written, 3 nothing done, because of a mistake in this program; from 129 on
+stopped, by the signal of that number less 128: 130 by Ctrl-C.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from pkmcal.exceptions import Error
 
 DONE, NOT_TRUSTED, REFUSED, MISTAKE = 0, 1, 2, 3
 _LONGEST = 1000  # letters of a message: names of others may be in it
-_KINDS = {REFUSED: "input", MISTAKE: "mistake", interrupt.STOPPED: "stopped"}
+_KINDS = {REFUSED: "input", MISTAKE: "mistake"}  # any other: stopped
 _WHERE = re.compile(r"(?P<file>.+?), line (?P<line>[0-9]+)(?:, column '(?P<column>[^']*)')?: ")
 
 
@@ -38,7 +39,7 @@ def code(error: BaseException, json: bool = False) -> int:
         parts["line"] = parts["line"] and int(parts["line"])
         if isinstance(error, OSError) and not where:
             parts["file"] = error.filename or message.partition(": ")[0]
-        said = {"message": message, "kind": _KINDS[how], "exit_code": how, **parts}
+        said = {"message": message, "kind": _KINDS.get(how, "stopped"), "exit_code": how, **parts}
         print(as_json({"error": said}, schema="error"))
     return how
 
@@ -46,7 +47,7 @@ def code(error: BaseException, json: bool = False) -> int:
 def _reason(error: BaseException) -> tuple[str, int]:
     """What to say of an error, and the exit code."""
     if isinstance(error, KeyboardInterrupt):
-        return interrupt.WORDS, interrupt.STOPPED
+        return interrupt.words(error), interrupt.code(error)
     if isinstance(error, MemoryError):
         return "not enough memory for what was given", REFUSED
     if isinstance(error, OSError):

@@ -79,7 +79,7 @@ def export(
         files, loss = contents(machine, out.resolve().name)
         with Output(out, list(files), read, force).draft() as draft:
             for name, text in files.items():
-                (draft / name).write_text(text, encoding="utf-8")
+                (draft / name).write_bytes(text.encode())  # line ends as they are
     else:
         given = None if config is None else read.file(config)
         with Output(out.parent, [out.name], read, force).draft() as draft:

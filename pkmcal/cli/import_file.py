@@ -62,7 +62,7 @@ def import_file(
     tables = _tables(printer)
     output = Output(out, ["robot.toml", *tables], read, force)
     with output.draft() as draft:
-        (draft / "robot.toml").write_text(read.comment() + printer.text, encoding="utf-8")
+        (draft / "robot.toml").write_bytes((read.comment() + printer.text).encode())
         for name, measured in tables.items():
             units = reading_units(printer.robot)
             write_measurements(measured, draft / name, read.comment(), units)

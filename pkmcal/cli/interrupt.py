@@ -1,16 +1,44 @@
-"""Ctrl-C: while the program is loaded or ends it ends at once, while a verb works it is raised.
+"""Ctrl-C, and signals that ask a program to end.
 
-Imports next to nothing, so that it is provided for from the beginning.
+While the program is loaded or ends they end it at once, while a verb works they are raised.
+Imports next to nothing, so that they are provided for from the beginning.
 """
 
 from __future__ import annotations
 
 import os
 import signal
+import time
+from contextlib import suppress
 from types import FrameType
 
-STOPPED = 130  # what shells give a program that Ctrl-C ended
-WORDS = "stopped by Ctrl-C"
+_NAMES = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")  # the last is that of a console of Windows
+_SIGNALS = [getattr(signal, name) for name in _NAMES if hasattr(signal, name)]
+_TWICE = 1.0  # s: a terminal that closes says so twice
+
+
+class Stopped(KeyboardInterrupt):
+    """A signal came while a verb worked.
+
+    Attributes
+    ----------
+    number : int
+        Of the signal.
+    """
+
+    def __init__(self, number: int) -> None:
+        super().__init__(number)
+        self.number = number
+
+
+def code(stop: KeyboardInterrupt) -> int:
+    """Return what shells give a program that was ended so."""
+    return 128 + _number(stop)
+
+
+def words(stop: KeyboardInterrupt) -> str:
+    """Say what ended the program."""
+    return _said(_number(stop))
 
 
 def ends_at_once() -> None:
@@ -22,14 +50,22 @@ class IsRaised:
     """While in this context: as KeyboardInterrupt, so that what was begun is tidied up."""
 
     def __enter__(self) -> None:
-        self._before = signal.getsignal(signal.SIGINT)
+        self._before = [signal.getsignal(number) for number in _SIGNALS]
+        self._last = -_TWICE
         self._begin()
 
     def _begin(self) -> None:
-        _handle(signal.default_int_handler)
+        _handle(self._raise)
+
+    def _raise(self, number: int, frame: FrameType | None) -> None:
+        before, self._last = self._last, time.monotonic()
+        if self._last - before >= _TWICE:  # else it is being tidied up
+            raise Stopped(number)
 
     def __exit__(self, *_: object) -> None:
-        signal.signal(signal.SIGINT, self._before)
+        for number, handler in zip(_SIGNALS, self._before, strict=True):
+            if handler is not None:
+                signal.signal(number, handler)
 
 
 class EndsAtOnce(IsRaised):
@@ -40,10 +76,22 @@ class EndsAtOnce(IsRaised):
 
 
 def _handle(handler: signal._HANDLER) -> None:
-    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:  # a program in the background
-        signal.signal(signal.SIGINT, handler)
+    for number in _SIGNALS:
+        # ignored: in the background, or under nohup; None: what embeds Python handles it
+        if signal.getsignal(number) not in (signal.SIG_IGN, None):
+            signal.signal(number, handler)
 
 
 def _end(number: int, frame: FrameType | None) -> None:
-    os.write(2, f"pkmcal: {WORDS}\n".encode())
-    os._exit(STOPPED)
+    with suppress(OSError):  # there may be no stderr
+        os.write(2, f"pkmcal: {_said(number)}\n".encode())
+    os._exit(128 + number)
+
+
+def _number(stop: KeyboardInterrupt) -> int:
+    return stop.number if isinstance(stop, Stopped) else signal.SIGINT
+
+
+def _said(number: int) -> str:
+    name = "Ctrl-C" if number == signal.SIGINT else signal.Signals(number).name
+    return f"stopped by {name}"

@@ -5,10 +5,20 @@ from __future__ import annotations
 from pkmcal.cli import interrupt
 
 
+def _escaped(error: UnicodeError) -> tuple[str, int]:
+    """Characters that an encoding has not, in the way that JSON has them."""
+    import json
+
+    assert isinstance(error, UnicodeEncodeError)
+    return json.dumps(error.object[error.start : error.end])[1:-1], error.end
+
+
 def main() -> None:
     """Run the command line; `pkmcal` on the shell."""
     interrupt.ends_at_once()
+    import codecs
     import io
+    import os
     import signal
     import sys
     import warnings
@@ -17,8 +27,12 @@ def main() -> None:
 
     if hasattr(signal, "SIGPIPE"):
         signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # `pkmcal … | head` ends as others do
+    if sys.stderr is None:  # closed, as services have it, and pythonw
+        sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
     if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="replace")  # a terminal without σ gets "?"
+        codecs.register_error("as in JSON", _escaped)
+        # a terminal without σ gets "?", who reads JSON gets an escape
+        sys.stdout.reconfigure(errors="as in JSON" if "--json" in sys.argv else "replace")
     try:
         from pkmcal.cli.verbs import app
     except Exception as error:

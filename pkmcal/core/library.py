@@ -109,11 +109,12 @@ FUNCTIONS = [_functions(isa) for isa in ISAS[: lib.pkm_best_isa() + 1]]
 ROW_CALLS = dict(map(_row_call, _text(lib.pkm_row_calls()).splitlines()))
 
 
-# By the type of its numbers, as `array.dtype.char` has it.
-_POINTERS = {
-    kind: ffi.typeof(f"{name} *")
-    for kinds, name in (("dD", "double"), ("i", "int32_t"), ("l", "int64_t"), ("L", "uint64_t"))
-    for kind in kinds
+# By the type of its numbers, as `array.dtype.char` has it: "l" has 64 bits here and 32 on Windows.
+_POINTERS = {"d": ffi.typeof("double *"), "D": ffi.typeof("double *")}
+_POINTERS |= {
+    kind: ffi.typeof(f"{np.dtype(kind).name}_t *")
+    for kind in "ilqLQ"
+    if np.dtype(kind).name in ("int32", "int64", "uint64")
 }
 
 
@@ -191,6 +192,13 @@ def rows(function: str, *arrays: FloatArray, isa: int | None = None) -> list[Flo
     return made
 
 
+def processors() -> int:
+    """How many processors this process may use, or has, where the system knows no difference."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
 def in_threads(run: Callable[[int, int], None], rows: int, threads: int | None) -> None:
     """Run ``run(start, stop)`` over contiguous parts of the rows, in threads.
 
@@ -205,7 +213,7 @@ def in_threads(run: Callable[[int, int], None], rows: int, threads: int | None) 
     """
     if threads is None:
         threads = rows // ROWS_PER_THREAD
-        threads = min(threads, len(os.sched_getaffinity(0))) if threads > 1 else 1
+        threads = min(threads, processors()) if threads > 1 else 1
     else:
         threads = min(whole("threads", threads, 1, note=" or None"), max(rows, 1), MOST_THREADS)
     if threads == 1:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,7 +10,7 @@ import numpy as np
 from pkmcal._core import ffi, lib
 from pkmcal.arguments import number, whole
 from pkmcal.arrays import FloatArray
-from pkmcal.core.library import ISA, call, in_threads, part
+from pkmcal.core.library import ISA, call, in_threads, part, processors
 
 SWARMS_PER_THREAD = 16  # fewer do not pay for a thread
 
@@ -170,7 +169,7 @@ def minimise_eq18(
 
     if sets:
         if threads is None:
-            threads = max(1, min(len(os.sched_getaffinity(0)), sets // SWARMS_PER_THREAD))
+            threads = max(1, min(processors(), sets // SWARMS_PER_THREAD))
         in_threads(run, sets, threads)
     unreached = ~np.isfinite(off).all(axis=(1, 2))
     correction[unreached] = np.nan

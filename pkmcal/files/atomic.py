@@ -14,6 +14,9 @@ from pkmcal.exceptions import MissingFileError
 
 _PART = ".pkmcal-{}.part"  # short: a name may be as long as the file system allows
 _GONE = 3600.0  # seconds after which whoever wrote a part was killed
+# Windows replaces no file that somebody has open, as scanners for viruses have it for a moment:
+# seconds after which it is tried again.
+_WAITS = () if os.name == "posix" else (0.01, 0.03, 0.1, 0.3, 0.6)
 
 
 def write_whole(path: str | PathLike[str], content: str | bytes) -> None:
@@ -33,8 +36,8 @@ def write_whole(path: str | PathLike[str], content: str | bytes) -> None:
     Raises
     ------
     OSError
-        The folder does not exist or cannot be written, the disk is full: with the path; what was
-        there before is untouched.
+        The folder does not exist or cannot be written, the disk is full, or, on Windows, another
+        program has the file open: with the path; what was there before is untouched.
     """
     write_pieces(path, [content.encode() if isinstance(content, str) else content])
 
@@ -66,7 +69,7 @@ def write_pieces(path: str | PathLike[str], pieces: Iterable[bytes]) -> None:
         _write(beside, pieces)
         if place.exists():
             os.chmod(beside, place.stat().st_mode & 0o7777)
-        os.replace(beside, place)
+        _move(beside, place)
         _synchronise(place.parent)
     except OSError as error:  # names the part
         if error.errno is None:
@@ -82,6 +85,15 @@ def _write(path: Path, pieces: Iterable[bytes]) -> None:
             file.write(piece)
         file.flush()
         os.fsync(file.fileno())
+
+
+def _move(part: Path, place: Path) -> None:
+    for wait in _WAITS:
+        try:
+            return os.replace(part, place)
+        except PermissionError:
+            time.sleep(wait)
+    os.replace(part, place)
 
 
 def _synchronise(folder: Path) -> None:

@@ -1,11 +1,13 @@
 """A table of a file as columns with a name and a unit, and errors that say where they are.
 
 Tabs, semicolons, commas or spaces separate; with all but commas, numbers may have a decimal comma.
+What 1,234 or 1.234 means, a thousand or less, the column says, or else all of the file.
 Empty lines and lines that start with ``#``, ``//`` or ``%`` are skipped, and what lies above the
 column names; units are converted here and nowhere else.
 A column is headed ``x [mm]``, or as instruments write it: ``x (mm)``, ``x_mm``, ``x/mm``, ``x mm``;
 its unit may also stand below it, or above the table as in ``Units: mm``.
-The first sheet of an Excel workbook is read likewise. What was assumed is kept as `Table.notes`.
+The first sheet of an Excel workbook that is not hidden is read likewise. What was assumed is kept
+as `Table.notes`.
 """
 
 from __future__ import annotations
@@ -26,9 +28,9 @@ from pkmcal.exceptions import FileError
 from pkmcal.files import reading, units
 from pkmcal.files.column_names import BESIDE, is_known
 from pkmcal.files.header import Header, find_header, parted
-from pkmcal.files.number_text import Signs, plain, thousands
+from pkmcal.files.number_text import Signs, decimals, plain, thousands, undecided
 from pkmcal.files.reading import LONGEST_NAME, MOST_CELLS, MOST_COLUMNS
-from pkmcal.files.text_rows import TextRows, is_number, text_rows
+from pkmcal.files.text_rows import is_number, text_rows
 from pkmcal.files.xlsx_rows import xlsx_rows
 
 _UNSEEN = ("-", "--", "---", "n/a", "na", "nan", "null", "none", "#n/a", "?")
@@ -55,6 +57,8 @@ class Column:
         The line of each cell.
     decimal_comma : bool
         Whether its numbers may have one.
+    decimals : mapping of str to str
+        The marks of decimals in its file, each with a cell that can be read in no other way.
     stated : mapping of str to (str, int)
         Units that its file states for all columns, of "mm" and "rad", with their lines.
     """
@@ -66,6 +70,7 @@ class Column:
     heading: int
     lines: tuple[int, ...]
     decimal_comma: bool
+    decimals: Mapping[str, str]
     stated: Mapping[str, tuple[str, int]]
 
     def take(self, rows: Sequence[int]) -> Column:
@@ -115,7 +120,7 @@ class Table:
         self.path = arguments.path("path", path)
         packed = self.path.suffix.lower() in (".xlsx", ".xlsm", ".xls")
         if packed:
-            text = TextRows(xlsx_rows(path))
+            text = xlsx_rows(path)
         else:
             text = text_rows(self.path, reading.content(path, reading.MOST_TABLE))
         if headings is not None:
@@ -158,6 +163,7 @@ class Table:
                     f"{self.path}, line {line}: {found} under {width} column names{hint}"
                 )
         self.lines = [line for line, _ in rows]
+        self._decimals = decimals(cells for _, cells in rows) if self._comma else {}
         self.columns: dict[str, Column] = {}
         for i, heading in enumerate(names):
             self._add(i, heading, tuple(cells[i] for _, cells in rows))
@@ -188,7 +194,8 @@ class Table:
         lines = tuple(self.lines)
         place = str(self.path)
         self.columns[name] = Column(
-            name, unit, cells, place, self._header_line, lines, self._comma, self._units
+            *(name, unit, cells, place, self._header_line, lines, self._comma),
+            *(self._decimals, self._units),
         )
 
     def leave_out(self, names: Collection[str]) -> None:
@@ -306,7 +313,7 @@ class Table:
             column = replace(column, unit=unit)
         quantity, (times, over) = self._conversion(column, quantities, expected)
         values = np.empty(len(self))
-        signs = self._signs(column)
+        signs = self._signs(name, column)
         for row, cell in enumerate(column.cells):
             if unseen and cell.lower() in _UNSEEN:
                 values[row] = math.nan
@@ -373,12 +380,30 @@ class Table:
         if text not in self.notes:
             self.notes.append(text)
 
-    def _signs(self, column: Column) -> Signs | None:
+    def _signs(self, name: str, column: Column) -> Signs | None:
         found = thousands(column.cells)
         if found is None:
+            if column.decimal_comma:
+                self._decide(name, column)
             return None
         self.note(f"{found[1]!r} in column {column.name!r} taken as a number with thousands apart")
         return found[0]
+
+    def _decide(self, name: str, column: Column) -> None:
+        """Take 1,234 for less than two where the other decimals of its file do not contradict."""
+        for row, mark in undecided(column.cells):
+            cell = printable(column.cells[row])
+            less, more = cell.replace(mark, "."), cell.replace(mark, "")
+            others = [shown for other, shown in column.decimals.items() if other != mark]
+            if others:
+                raise self.cell_error(
+                    name,
+                    row,
+                    f"{cell!r} may be {less} or {more}: others, such as {printable(others[0])!r},"
+                    " have decimals in another way",
+                )
+            if mark == "," and not column.decimals:
+                self.note(f"{cell!r} in column {column.name!r} taken as {less}")
 
     def _number(self, name: str, row: int, cell: str, signs: Signs | None) -> float:
         try:

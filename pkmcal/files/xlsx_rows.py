@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import re
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -15,17 +15,24 @@ from pkmcal import arguments
 from pkmcal.display import printable
 from pkmcal.exceptions import FileError
 from pkmcal.files import reading
+from pkmcal.files.number_text import is_either
+from pkmcal.files.text_rows import TextRows
 
 _MOST_CELLS = 1_000_000  # a cell takes 10 microseconds
 _MOST_ROWS = 1_048_576  # Excel's own limit
 _LONGEST_SAID = 200  # letters
 _CELL = re.compile(rb"<(?:\w+:)?c[\s/>]")
+_HIDDEN = re.compile(
+    rb"<(?:\w+:)?row(?=\s)(?=[^>]*\shidden=[\"'](?:1|true)[\"'])[^>]*?\sr=[\"']([0-9]{1,7})[\"']"
+)
+_LISTED = 5
 
 
-def xlsx_rows(path: str | PathLike[str]) -> list[tuple[int, list[str]]]:
-    """Rows of the first sheet as text, with their numbers; neither empty ones nor comments.
+def xlsx_rows(path: str | PathLike[str]) -> TextRows:
+    """Rows of the first sheet that is not hidden, as text; neither empty ones nor comments.
 
     Numbers are written so that they are read back to the last bit; of a formula its last value.
+    Notes say which sheets were not read, and which rows are hidden, as by a filter: they are read.
 
     Parameters
     ----------
@@ -47,13 +54,12 @@ def xlsx_rows(path: str | PathLike[str]) -> list[tuple[int, list[str]]]:
         import openpyxl  # noqa: F401
     except ImportError:
         raise FileError(
-            f"{place}: reading Excel files takes openpyxl (pip install 'pkmcal[xlsx]');"
-            " or save it as CSV"
+            f"{place}: reading Excel files takes openpyxl (pip install openpyxl); or save it as CSV"
         ) from None
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of styles and what else is not looked at
-            return list(_rows(place, content))
+            return _first_sheet(place, content)
     except (FileError, MemoryError):
         raise
     except Exception as error:  # openpyxl has no error of its own for what is damaged
@@ -61,7 +67,7 @@ def xlsx_rows(path: str | PathLike[str]) -> list[tuple[int, list[str]]]:
         raise FileError(f"{place}: not an Excel workbook ({said})") from None
 
 
-def _rows(path: Path, content: bytes) -> Iterator[tuple[int, list[str]]]:
+def _first_sheet(path: Path, content: bytes) -> TextRows:
     from openpyxl import load_workbook
 
     packed = ZipFile(io.BytesIO(content))
@@ -71,14 +77,44 @@ def _rows(path: Path, content: bytes) -> Iterator[tuple[int, list[str]]]:
             f"{path}: {unpacked // reading.MB} MB unpacked, at most"
             f" {reading.MOST_WORKBOOK // reading.MB} MB are read; save it as CSV"
         )
-    sheets = (name for name in packed.namelist() if name.startswith("xl/worksheets/"))
-    for name in sheets:  # openpyxl reads a row as a whole, however long
-        if sum(1 for _ in _CELL.finditer(packed.read(name))) > _MOST_CELLS:
-            raise FileError(f"{path}: more than {_MOST_CELLS} cells; save it as CSV")
+    parts = (name for name in packed.namelist() if name.startswith("xl/worksheets/"))
+    cells = {name: sum(1 for _ in _CELL.finditer(packed.read(name))) for name in parts}
+    if any(count > _MOST_CELLS for count in cells.values()):  # openpyxl reads whole rows
+        raise FileError(f"{path}: more than {_MOST_CELLS} cells; save it as CSV")
     book = load_workbook(io.BytesIO(content), data_only=True, read_only=True)
     if not book.worksheets:
-        return
-    sheet = book.worksheets[0]
+        return TextRows()
+    shown = [sheet for sheet in book.worksheets if sheet.sheet_state == "visible"]
+    sheet = (shown or book.worksheets)[0]
+    others = [
+        f"{printable(each.title)!r}{' (hidden)' * (each.sheet_state != 'visible')}"
+        for each in book.worksheets
+        if each is not sheet and cells.get(_part(each), 1)
+    ]
+    found = TextRows(list(_rows(path, sheet)))
+    if others:
+        found.notes.append(
+            f"of the workbook the sheet {printable(sheet.title)!r} was read, not {_few(others)}"
+        )
+    taken = {number for number, _ in found.rows}
+    hidden = [int(row) for row in _HIDDEN.findall(packed.read(_part(sheet))) if int(row) in taken]
+    if hidden:
+        rows = f"{len(hidden)} row{'s' * (len(hidden) > 1)}"
+        found.notes.append(f"{rows} hidden in the workbook, and read: {_few(map(str, hidden))}")
+    return found
+
+
+def _part(sheet: Any) -> str:
+    """Where in the packed workbook a sheet is."""
+    return str(sheet._worksheet_path).lstrip("/")
+
+
+def _few(names: Iterable[str]) -> str:
+    listed = list(names)
+    return ", ".join(listed[:_LISTED]) + (", …" if len(listed) > _LISTED else "")
+
+
+def _rows(path: Path, sheet: Any) -> Iterator[tuple[int, list[str]]]:
     sheet.reset_dimensions()  # what is stated may be wrong
     width = cells = 0
     for number, row in enumerate(sheet.iter_rows(), start=1):
@@ -103,4 +139,7 @@ def _rows(path: Path, content: bytes) -> Iterator[tuple[int, list[str]]]:
 def _text(value: Any) -> str:
     if isinstance(value, float) and value.is_integer() and abs(value) < 1e15:
         return str(int(value))
+    if isinstance(value, float):
+        text = repr(value)
+        return text + "0" if is_either(text) else text  # 1.2340 is no thousand
     return "" if value is None else str(value).strip()

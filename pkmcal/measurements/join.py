@@ -16,7 +16,7 @@ from pkmcal.files.csv_table import Table
 from pkmcal.measurements.actuator_columns import actuators_in
 from pkmcal.measurements.field import Field
 from pkmcal.measurements.table_layout import split
-from pkmcal.measurements.time_stamps import seconds, with_date
+from pkmcal.measurements.time_stamps import DAY, Times, times_in
 
 Join = Literal["auto", "name", "row", "time"]
 JOINS: tuple[Join, ...] = ("auto", "name", "row", "time")
@@ -190,27 +190,34 @@ def _key(name: str, loose: bool) -> str:
 
 
 def _by_time(table: Table, log: Table) -> tuple[Rows, str] | str:
-    times = []
+    both: list[Times] = []
     for each in (table, log):
         if "time" not in each.columns:
             return f"{each.path} has no time-stamps"
-        cells = each.columns["time"].cells
-        found = seconds(with_date(each, cells))
-        if found is None:
-            return f"the time-stamps of {each.path}, such as {cells[0]!r}, are not of one form"
-        times.append(found)
-    (mine, since), (theirs, start) = times
-    if since != start:
-        return f"time-stamps count from {since} in one and from {start} in the other"
-    if (np.diff(theirs) < 0).any():
-        row = int(np.argmax(np.diff(theirs) < 0)) + 1
+        found = times_in(each)
+        if isinstance(found, str):
+            return f"the time-stamps of {each.path} cannot be read: {found}"
+        both.append(found)
+    mine, theirs = both
+    if mine.since != theirs.since:
+        return f"time-stamps count from {mine.since} in one and from {theirs.since} in the other"
+    if mine.in_utc != theirs.in_utc:
+        stated, other = (table, log) if mine.in_utc else (log, table)
+        return f"{stated.path} states how its clock is ahead of UTC, {other.path} does not"
+    logged = theirs.seconds
+    if (np.diff(logged) < 0).any():
+        row = int(np.argmax(np.diff(logged) < 0)) + 1
         return f"{log.path}, line {log.lines[row]}: time goes back"
-    rows = np.searchsorted(theirs, mine, side="right") - 1
-    inside = (rows >= 0) & (mine <= theirs[-1] + max(np.diff(theirs).max(initial=0.0), 1.0))
+    last = logged[-1] + max(np.diff(logged).max(initial=0.0), 1.0)
+    days = (0.0, DAY, -DAY) if mine.since == "midnight" else (0.0,)  # one may begin a day later
+    taken = [mine.seconds + day for day in days]
+    times = max(taken, key=lambda at: int(((at >= logged[0]) & (at <= last)).sum()))
+    rows = np.searchsorted(logged, times, side="right") - 1
+    inside = (rows >= 0) & (times <= last)
     if inside.mean() < _ENOUGH:
         return "the time-stamps do not overlap"
     moving = _moving(log, rows[inside])
-    late = (mine - theirs[np.maximum(rows, 0)])[inside]
+    late = (times - logged[np.maximum(rows, 0)])[inside]
     said = (
         "each point has the last row at or before it,"
         f" {late.min():.3g} to {late.max():.3g} s earlier"
@@ -232,8 +239,10 @@ def _moving(log: Table, rows: IntArray) -> int:
 
 def _relative(table: Table) -> bool:
     """Whether time-stamps are small numbers, as of seconds since a start."""
-    found = seconds(table.columns["time"].cells)
-    return found is not None and found[1] == "a start" and float(found[0].max()) < _EPOCH
+    found = times_in(table)
+    if isinstance(found, str):
+        return False
+    return found.since == "a start" and float(found.seconds.max()) < _EPOCH
 
 
 def _by_row(table: Table, log: Table) -> tuple[Rows, str] | str:

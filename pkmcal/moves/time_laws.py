@@ -189,7 +189,7 @@ def jerk_limited(
 ) -> JerkLimited:
     """The fastest move from rest to rest within limits, with limited jerk.
 
-    Needs the package ``ruckig``: ``pip install 'pkmcal[ruckig]'``.
+    Needs the package ``ruckig``: ``pip install ruckig``.
 
     Parameters
     ----------
@@ -218,9 +218,7 @@ def jerk_limited(
     try:
         import ruckig
     except ImportError as error:
-        raise ImportError(
-            "a jerk-limited move needs ruckig: pip install 'pkmcal[ruckig]'"
-        ) from error
+        raise ImportError("a jerk-limited move needs ruckig: pip install ruckig") from error
     wanted = ruckig.InputParameter(len(first))
     wanted.current_position, wanted.target_position = first.tolist(), last.tolist()
     wanted.max_velocity = limits["velocity"].tolist()

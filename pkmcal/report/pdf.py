@@ -16,7 +16,23 @@ from pkmcal.exceptions import ArgumentError
 
 _BROWSERS = (
     *("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome"),
-    *("microsoft-edge", "brave-browser"),
+    *("microsoft-edge", "msedge", "brave-browser"),
+)
+# Where macOS and Windows have them, which is not on the path.
+_APPLICATIONS = (
+    *(
+        f"/Applications/{name}.app/Contents/MacOS/{name}"
+        for name in ("Google Chrome", "Chromium", "Microsoft Edge", "Brave Browser")
+    ),
+    *(
+        os.path.join(os.environ[folder], *parts)
+        for folder in ("ProgramFiles", "ProgramFiles(x86)", "LocalAppData")
+        if folder in os.environ
+        for parts in (
+            ("Google", "Chrome", "Application", "chrome.exe"),
+            ("Microsoft", "Edge", "Application", "msedge.exe"),
+        )
+    ),
 )
 _FLAGS = (
     *("--headless", "--disable-gpu", "--no-first-run", "--disable-background-networking"),
@@ -34,7 +50,7 @@ def browser() -> str:
     ValueError
         None is installed.
     """
-    for name in _BROWSERS:
+    for name in (*_BROWSERS, *_APPLICATIONS):
         if found := shutil.which(name):
             return found
     raise ArgumentError(
@@ -67,6 +83,8 @@ def print_page(page: Path, to: Path) -> None:
             said = done.stderr.strip().splitlines()
         except subprocess.TimeoutExpired:
             said = [f"no answer within {_PATIENCE} s"]
+        except OSError as error:
+            said = [str(error)]
     if not to.exists():
         why = said[-1] if said else "it does not say why"
         raise ArgumentError(f"pdf: {by} printed nothing: {why}")

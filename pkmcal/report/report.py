@@ -58,7 +58,7 @@ def write(
     Raises
     ------
     ValueError
-        No PDF can be printed.
+        No PDF can be printed; if that shows only in printing, the other files have been written.
     OSError
         The folder cannot be written.
     """

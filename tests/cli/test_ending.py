@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import signal
@@ -20,6 +21,8 @@ from pkmcal.exceptions import ArgumentError
 
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = [sys.executable, "-c", "from pkmcal.cli.main import main; main()"]
+DELTA = ROOT / "examples" / "linear-delta"
+CALIBRATION = f"calibrate {DELTA / 'robot.toml'} {DELTA / 'probe.csv'} --report out --force"
 HEXAPOD = (Path(pk.__file__).parent / "builtin/machines/hexapod.toml").read_text("utf-8")
 HOSTILE = "\x1b]0;owned\x07\x1b[31m red \u202e bidi \x00 nul \x9b8m"
 CONTROL = re.compile(r"[\x00-\x09\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
@@ -77,12 +80,51 @@ def test_an_environment_that_is_wrong_is_named_before_anything_else() -> None:
     assert done.stderr == "pkmcal: PKMCAL_ISA must be one of base, avx2, avx512, found 'zzz'\n"
 
 
+def test_the_module_is_the_command(tmp_path: Path) -> None:
+    said = subprocess.run([sys.executable, "-m", "pkmcal", "machines"], capture_output=True)
+    assert (said.returncode, said.stderr) == (0, b"")
+    assert said.stdout.decode() == process("machines").stdout
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "cp1252", "cp437", "utf-8"])
+def test_json_says_all_whatever_the_encoding_of_stdout(encoding: str) -> None:
+    """As where Windows sends it into a file or a pipe."""
+    name = "Prüfstand σ₁ 机器 😀"
+    path = hostile(name)
+    done = subprocess.run(
+        [*PROGRAM, "check", str(path), "--json"],
+        capture_output=True,
+        env={**os.environ, "PYTHONIOENCODING": encoding},
+    )
+    written = "utf-8" if encoding == "ascii" else encoding  # typer mistrusts ASCII
+    said = json.loads(done.stdout.decode(written))
+    assert (done.returncode, said["robot"]["name"]) == (0, name)
+
+
 def test_a_reader_that_leaves_ends_the_command_as_it_ends_others() -> None:
     command = f"{sys.executable} -c '{PROGRAM[2]}' check hexapod --json | head -c0"
     done = subprocess.run(
         ["bash", "-c", f"{command}; exit ${{PIPESTATUS[0]}}"], capture_output=True, text=True
     )
     assert (done.returncode, done.stderr) == (128 + signal.SIGPIPE, "")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="closes it in a shell")
+@pytest.mark.parametrize("verb", [CALIBRATION, "tolerance 3rps --sigma 0.1 --samples 100"])
+def test_without_stderr_a_command_works_as_with_it(verb: str) -> None:
+    """As services are started, and `pythonw`."""
+    command = f"{sys.executable} -m pkmcal {verb}"
+    closed, usual = (
+        subprocess.run(["sh", "-c", f"{command}{end}"], stdout=subprocess.PIPE, check=True)
+        for end in (" 2>&-", "")
+    )
+    assert closed.stdout == usual.stdout != b""
+
+
+def test_without_stderr_an_error_is_not_in_what_is_printed() -> None:
+    command = f"{sys.executable} -m pkmcal check nothing.toml 2>&-"
+    done = subprocess.run(["sh", "-c", command], stdout=subprocess.PIPE)
+    assert (done.returncode, done.stdout) == (2, b"")
 
 
 @pytest.mark.skipif(os.name != "posix", reason="sends a POSIX signal")

@@ -1,4 +1,4 @@
-"""Ctrl-C: one line at most, exit code 130, and no file half written."""
+"""Ctrl-C, SIGTERM and SIGHUP: one line at most, their exit code, and nothing half written."""
 
 from __future__ import annotations
 
@@ -20,35 +20,72 @@ _PROGRAM = "from pkmcal.cli.main import main; print('ready', flush=True); main()
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="sends a POSIX signal")
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ["tolerance", "2tpr2tps", "--sigma", "0.1", "--samples", "50000000", "--out", "."],
-        ["tolerance", "hexapod", "--allowed", "0.1", "--samples", "50000000", "--out", "."],
-    ],
-    ids=["tolerance", "allocation"],
+TOLERANCE = ["tolerance", "2tpr2tps", "--sigma", "0.1", "--samples", "50000000", "--out", "."]
+ALLOCATION = ["tolerance", "hexapod", "--allowed", "0.1", "--samples", "50000000", "--out", "."]
+# What writes pictures: its folder of drafts is there when the signal comes.
+DRAFTING = (
+    "import time\nfrom pkmcal.report import error_figures\n"
+    "def slow(*given):\n    print('ready', flush=True)\n    time.sleep(60)\n"
+    "error_figures.mean_errors = slow\nfrom pkmcal.cli.main import main\nmain()"
 )
-def test_interrupted_work_leaves_nothing_behind(arguments: list[str], tmp_path: Path) -> None:
+
+
+def ended_by(number: int, code: str, arguments: list[str], folder: Path, after: float) -> str:
+    """What a program says on stderr that gets a signal some time after it is ready."""
+    scratch = folder / "tmp"
+    scratch.mkdir()
     process = subprocess.Popen(
-        [sys.executable, "-c", _PROGRAM, *arguments],
-        cwd=tmp_path,
+        [sys.executable, "-c", code, *arguments],
+        cwd=folder,
+        env={**os.environ, "TMPDIR": str(scratch)},
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        # a shell that starts the tests in the background has them ignore the signal
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+        # a shell that starts the tests in the background has them ignore signals
+        preexec_fn=lambda: signal.signal(number, signal.SIG_DFL),
     )
     try:
         assert process.stdout is not None and process.stdout.readline() == "ready\n"
-        time.sleep(1.5)
+        time.sleep(after)
         assert process.poll() is None, "it was over before it could be interrupted"
-        process.send_signal(signal.SIGINT)
+        process.send_signal(number)
+        process.send_signal(number)  # as of a terminal that closes
         out, errors = process.communicate(timeout=60)
     finally:
         process.kill()
-    assert process.returncode == 130
+    assert process.returncode == 128 + number
     assert out == "" and "Traceback" not in errors
-    assert list(tmp_path.iterdir()) == []
+    assert list(scratch.iterdir()) == []
+    scratch.rmdir()
+    assert list(folder.iterdir()) == []
+    return errors
+
+
+@pytest.mark.parametrize(
+    ("number", "arguments"),
+    [(signal.SIGINT, TOLERANCE), (signal.SIGTERM, ALLOCATION)],
+    ids=["Ctrl-C", "SIGTERM"],
+)
+def test_interrupted_work_leaves_nothing_behind(
+    number: int, arguments: list[str], tmp_path: Path
+) -> None:
+    ended_by(number, _PROGRAM, arguments, tmp_path, after=1.5)
+
+
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
+def test_a_signal_leaves_no_draft(name: str, tmp_path: Path) -> None:
+    arguments = ["sensitivity", "hexapod", "--out", "out"]
+    number = signal.Signals[name]
+    assert ended_by(number, DRAFTING, arguments, tmp_path, 0.1) == f"pkmcal: stopped by {name}\n"
+
+
+def test_what_a_shell_has_ignored_stays_ignored(tmp_path: Path) -> None:
+    """As by nohup."""
+    code = "import os, signal\nsignal.signal(signal.SIGHUP, signal.SIG_IGN)\n"
+    code += "from pkmcal.cli.interrupt import IsRaised, ends_at_once\nends_at_once()\n"
+    code += "with IsRaised():\n    os.kill(os.getpid(), signal.SIGHUP)\nprint('went on')"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "went on\n", "")
 
 
 def test_interrupt_while_a_file_is_written_leaves_the_old_one(

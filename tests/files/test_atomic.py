@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import os
 import signal
 import stat
@@ -123,3 +124,41 @@ def test_content_is_on_the_disk_before_it_takes_the_place(
         monkeypatch.setattr(atomic.os, name, lambda *a, n=name, f=real: (calls.append(n), f(*a))[1])
     write_whole(tmp_path / "m.csv", "content")
     assert calls == ["fsync", "replace", "fsync"]
+
+
+def test_a_file_that_somebody_has_open_for_a_moment_is_replaced(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Windows refuses while it is open; here a stand-in does."""
+    path, real, left = tmp_path / "robot.toml", os.replace, [3]
+
+    def refused(part: Path, place: Path) -> None:
+        if left[0]:
+            left[0] -= 1
+            raise PermissionError(13, "Permission denied", str(part))
+        real(part, place)
+
+    path.write_text("old")
+    monkeypatch.setattr(os, "replace", refused)
+    monkeypatch.setattr(atomic, "_WAITS", (0.0, 0.0, 0.0))
+    write_whole(path, "new")
+    assert path.read_text() == "new"
+    left[0] = 4
+    with pytest.raises(PermissionError, match=r"robot\.toml"):
+        write_whole(path, "newer")
+    assert path.read_text() == "new" and list(tmp_path.iterdir()) == [path]
+
+
+def test_no_file_is_written_as_text() -> None:
+    """On Windows that would write other line ends than those of the content."""
+    package = Path(atomic.__file__).parents[1]
+    found = []
+    for file in package.rglob("*.py"):
+        for node in ast.walk(ast.parse(file.read_text("utf-8"))):
+            if not isinstance(node, ast.Call):
+                continue
+            name = getattr(node.func, "attr", getattr(node.func, "id", ""))
+            modes = [each.value for each in node.args if isinstance(each, ast.Constant)]
+            if name == "write_text" or (name == "open" and "w" in modes):
+                found.append(f"{file.relative_to(package).as_posix()}: {ast.unparse(node)}")
+    assert found == ["cli/main.py: open(os.devnull, 'w', encoding='utf-8')"]

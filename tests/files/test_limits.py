@@ -19,6 +19,7 @@ from pkmcal.core.library import MAX_LIMBS
 from pkmcal.files import reading
 from pkmcal.files.csv_table import Table
 from pkmcal.files.reading import LONGEST_NAME, MOST_COLUMNS
+from pkmcal.files.text_rows import TextRows
 from pkmcal.files.toml_lines import MOST_NESTED, Source
 from pkmcal.files.xlsx_rows import xlsx_rows
 
@@ -254,7 +255,7 @@ def test_bytes_changed_anywhere_in_a_workbook_give_rows_or_one_error(
             data[at] = random.integers(256)
         path.write_bytes(data)
         try:
-            assert isinstance(xlsx_rows(path), list)
+            assert isinstance(xlsx_rows(path), TextRows)
         except pk.FileError:
             refusals += 1
     assert 30 < refusals < 300
@@ -264,7 +265,7 @@ def test_a_stray_cell_far_below_costs_no_more_than_its_row(workbook: bytes, tmp_
     stray = b'<row r="1048576"><c r="XFD1048576"><v>9</v></c></row>'
     path = tmp_path / "m.xlsx"
     path.write_bytes(edited(workbook, lambda xml: xml.replace(END, stray + END)))
-    *rows, (number, cells) = xlsx_rows(path)
+    *rows, (number, cells) = xlsx_rows(path).rows
     assert rows == ROWS and number == 1_048_576
     assert len(cells) == 16_384 and cells[-1] == "9" and not any(cells[:-1])
 
@@ -273,4 +274,4 @@ def test_an_empty_row_and_a_short_one_keep_their_places(workbook: bytes, tmp_pat
     more = b'<row r="6"><c r="B6"><v>7</v></c></row><row r="8"><c r="A8"><v>8</v></c></row>'
     path = tmp_path / "m.xlsx"
     path.write_bytes(edited(workbook, lambda xml: xml.replace(END, more + END)))
-    assert xlsx_rows(path) == [*ROWS, (6, ["", "7"]), (8, ["8", ""])]
+    assert xlsx_rows(path).rows == [*ROWS, (6, ["", "7"]), (8, ["8", ""])]

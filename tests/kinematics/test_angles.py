@@ -374,7 +374,7 @@ def test_turning_joints_of_chains_stay_in_their_strokes_whatever_gain_and_offset
     "name", ["rotary-delta", "3rrr-planar", "five-bar", "eclipse", "agile-eye"]
 )
 def test_an_angle_that_has_lost_its_digits_is_infeasible(name: str) -> None:
-    """Whole turns are taken off up to 1e5 rad, of limbs and of chains; beyond, a turn is not known."""
+    """Whole turns are taken off up to 1e5 rad, of limbs and chains; beyond, none is known."""
     robot = pk.load(name)
     q = robot.inverse(robot.home)
     turning = int(np.flatnonzero(np.isfinite(robot.turns))[0])

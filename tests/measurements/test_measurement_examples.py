@@ -120,6 +120,43 @@ def test_numbers_of_a_workbook_are_exact(tmp_path: Path) -> None:
     np.testing.assert_array_equal(np.column_stack([read.actuators, read.values]), q)
 
 
+def test_a_number_of_a_workbook_is_a_number_whatever_others_look_like(tmp_path: Path) -> None:
+    """1.234 may be a thousand in a text file; a cell that holds a number is no text."""
+    path = workbook(tmp_path / "m.xlsx", ["q1 [mm]", "z [mm]"], [1.234, "2,5"], [-235.125, "3,25"])
+    read = read_measurements(path)
+    assert (read.actuators[:, 0].tolist(), read.values.tolist()) == ([1.234, -235.125], [2.5, 3.25])
+
+
+def test_a_text_of_a_workbook_may_be_a_thousand(tmp_path: Path) -> None:
+    path = workbook(tmp_path / "m.xlsx", ["q1 [mm]", "z [mm]"], ["1,450", 2.5])
+    with pytest.raises(ValueError, match=r"'1,450' may be 1\.450 or 1450"):
+        read_measurements(path)
+
+
+def test_hidden_rows_and_sheets_of_a_workbook_are_said(tmp_path: Path) -> None:
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    book.active.title, book.active.sheet_state = "raw", "hidden"
+    book.active.append(["q1 [mm]", "z [mm]"])
+    book.active.append([7, 8])
+    shown, empty, more = (book.create_sheet(name) for name in ("poses", "empty", "more"))
+    for row in (["q1 [mm]", "z [mm]"], [1, 2], [3, 4], [5, 6]):
+        shown.append(row)
+    more.append(["x"])
+    shown.row_dimensions[3].hidden = True
+    shown.auto_filter.ref = "A1:B4"
+    shown.row_dimensions[9].hidden = True  # nothing is there
+    book.active = 1
+    book.save(tmp_path / "m.xlsx")
+    read = read_measurements(tmp_path / "m.xlsx")
+    assert read.values.tolist() == [2, 4, 6]
+    assert [note.partition(": ")[2] for note in read.notes] == [
+        "of the workbook the sheet 'poses' was read, not 'raw' (hidden), 'more'",
+        "1 row hidden in the workbook, and read: 3",
+    ]
+    assert empty.title not in "".join(read.notes)
+
+
 def test_lines_of_a_workbook_count_as_in_excel(tmp_path: Path) -> None:
     path = workbook(tmp_path / "m.xlsx", ["# log"], ["q1 [mm]", "z (mm)"], [1, 2], [3, "off"])
     with pytest.raises(ValueError, match=r"m.xlsx, line 4, column 'z': .* found 'off'"):
@@ -157,5 +194,5 @@ def test_without_openpyxl_the_way_out_is_named(
         return real(name, *rest)
 
     monkeypatch.setattr(builtins, "__import__", without)
-    with pytest.raises(ValueError, match=r"pip install 'pkmcal\[xlsx\]'"):
+    with pytest.raises(ValueError, match="pip install openpyxl"):
         xlsx_rows(tmp_path / "m.xlsx")

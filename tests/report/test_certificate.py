@@ -17,6 +17,7 @@ from pkmcal.report import certificate, pdf, report
 
 from .. import browser, workspaces
 
+EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "linear-delta"
 HOSTILE = "<img src=x onerror=alert(1)>"
 TEXT = f"""
 number = "C-17"
@@ -233,8 +234,7 @@ def test_mistakes_in_the_file_are_named(tmp_path: Path, text: str, message: str)
 
 
 def test_it_is_part_of_a_report(run: Any, refused: Any, stated: Path, tmp_path: Path) -> None:
-    example = Path(__file__).resolve().parents[2] / "examples" / "linear-delta"
-    command = ("calibrate", example / "robot.toml", example / "probe.csv", "--certificate", stated)
+    command = ("calibrate", EXAMPLE / "robot.toml", EXAMPLE / "probe.csv", "--certificate", stated)
     assert "--report DIR" in refused(*command)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -257,18 +257,49 @@ def test_without_a_browser_a_pdf_is_refused_before_the_work(
     run: Any, refused: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
-    example = Path(__file__).resolve().parents[2] / "examples" / "linear-delta"
-    command = ("calibrate", example / "robot.toml", example / "probe.csv", "--pdf")
+    command = ("calibrate", EXAMPLE / "robot.toml", EXAMPLE / "probe.csv", "--pdf")
     assert "--pdf: it is part of the report, --report DIR" in refused(*command)
     said = refused(*command, "--report", tmp_path / "out")
     assert "pdf: no Chromium was found" in said and "open report.html in any browser" in said
     assert not (tmp_path / "out").exists()
 
 
-def test_a_browser_that_prints_nothing_is_named(tmp_path: Path) -> None:
-    broken = tmp_path / "chromium"
-    broken.write_text("#!/bin/sh\necho no display >&2\nexit 1\n")
+def broken_browser(folder: Path, text: str = "#!/bin/sh\necho no display >&2\nexit 1\n") -> None:
+    broken = folder / "chromium"
+    broken.write_text(text)
     broken.chmod(0o755)
+
+
+@pytest.mark.parametrize("text", ["#!/bin/sh\necho no display >&2\n", "\0 no program"])
+def test_a_pdf_that_fails_leaves_the_report(
+    run: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, text: str
+) -> None:
+    broken_browser(tmp_path, text)
+    monkeypatch.setenv("PATH", f"{tmp_path}:/bin:/usr/bin")
+    command = ("calibrate", EXAMPLE / "robot.toml", EXAMPLE / "probe.csv", "--report")
+    usual = run(*command, tmp_path / "usual")
+    failed = run(*command, tmp_path / "out", "--pdf")
+    assert (usual.exit_code, failed.exit_code) == (0, 1)
+    (line,) = failed.stderr.splitlines()
+    assert line.startswith(f"pkmcal: pdf: {tmp_path / 'chromium'} printed nothing")
+    assert failed.stdout == usual.stdout.replace(str(tmp_path / "usual"), str(tmp_path / "out"))
+    written = {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()}
+    assert written == {path.name: path.read_bytes() for path in (tmp_path / "usual").iterdir()}
+
+
+def test_a_browser_is_found_where_its_system_has_it(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Applications of macOS and Windows are not on the path."""
+    broken_browser(tmp_path)
+    monkeypatch.setenv("PATH", "")
+    place = str(tmp_path / "chromium")
+    monkeypatch.setattr(pdf, "_APPLICATIONS", (str(tmp_path / "absent"), place))
+    assert pdf.browser() == place
+
+
+def test_a_browser_that_prints_nothing_is_named(tmp_path: Path) -> None:
+    broken_browser(tmp_path)
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("PATH", f"{tmp_path}:/bin:/usr/bin")
         with pytest.raises(pk.ArgumentError, match="chromium printed nothing: no display"):
