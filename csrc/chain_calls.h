@@ -329,31 +329,24 @@ int CALL(chain_inverse)(const pkm_chains *machine, ptrdiff_t n, const double *ge
 
 /* Where chains one by one do not agree on a joint that they share: the passive joints with which Newton's
  * method rests at the pose, from there or from home. */
-SHARED void chain_agree(const pkm_chains *machine, const chain_numbers *numbers, const real *pose,
+SHARED void chain_agree(const pkm_chains *machine, const chain_numbers *numbers, real *pose,
                         const real *R, const real *p, const real *drive, chain_state *at, real *missed)
 {
     const motion home = fill_motion(machine->home);
-    real from[6];
-    memcpy(from, pose, sizeof from);
     for (int attempt = 0; attempt < 2; attempt++) {
         const mask open = ~(*missed <= fill(AGREED * machine->size)) & is_finite(pose[0]);
-        chain_start start = {0};
-        chain_prediction predicted;
-        chain_answer answer;
+        chain_start start;
+        chain_answer answer = {.status = fill_mask(PKM_NOT_CONVERGED)};
         real to[PKM_MAX_LIMBS];
         if (!any(open)) return;
-        if (attempt) FN(motion_pose)(home.R, home.p, from);
+        if (attempt) FN(motion_pose)(home.R, home.p, pose);
         memcpy(to, drive, sizeof(real) * machine->actuators);
-        chain_guess(machine, numbers, from, to, &start);
-        chain_predict(machine, numbers, &start.at, start.from, &predicted);
+        chain_guess(machine, numbers, pose, to, &start);
         chain_unwind(machine, start.from, to);
-        chain_solve(machine, numbers, &start.at, &predicted, start.from, to, open, &answer.at,
-                    &answer.status, &answer.iterations, &answer.residual);
-        chain_settle_doubt(machine, numbers, &start, to, open, &answer);
+        chain_solve_again(machine, numbers, &start.at, &start.at, start.from, to, open, &answer);
         const real misses = chains_miss(machine, numbers, R, p, 0, answer.at.theta, drive);
         const mask better = open & (answer.status == fill_mask(PKM_OK)) & ~(misses >= *missed);
-        for (int c = 0; c < machine->passive; c++)
-            at->theta[c] = select(better, answer.at.theta[c], at->theta[c]);
+        chain_choose(machine, better, answer.at.theta, drive, at->theta, to);
         *missed = select(better, misses, *missed);
     }
 }
