@@ -6,6 +6,7 @@ from collections.abc import MutableMapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from pkmcal.arguments import instance
 from pkmcal.diagnostics.check import Check, Said
 from pkmcal.diagnostics.checks import CHECKS
 from pkmcal.diagnostics.diagnosis import Diagnosis, verified
@@ -68,6 +69,8 @@ def diagnose(
 
     Raises
     ------
+    TypeError
+        No result of `identify`.
     ValueError
         Checks whose names, levels or `Check.unless` do not agree.
 
@@ -89,6 +92,7 @@ def diagnose(
     >>> pk.diagnose(found, (*pk.CHECKS, coarse)).said[-1].check
     'coarse'
     """
+    instance("found", found, Solution, ", which `identify` returns")
     said = Diagnosis(found, verified(checks), {} if findings is None else findings).said()
     warned = {check.name for check in checks if check.at_once}
     grave = [each.text for each in said if each.level == "grave"]

@@ -398,4 +398,4 @@ def test_a_machine_on_a_wall_is_calibrated_as_one_on_the_floor(paper: Robot) -> 
 def test_what_is_no_word_is_named(paper: Robot, word: str) -> None:
     measured = VirtualMachine(paper).measure(paper.inverse(paper.home[None]))
     with pytest.raises(ValueError, match=f"{word} must be one of known, unknown; found None"):
-        identify(paper, measured, **{word: None})  # type: ignore[arg-type]
+        identify(paper, measured, unknown={word: None})  # type: ignore[dict-item]

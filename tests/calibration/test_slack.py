@@ -310,8 +310,9 @@ def test_the_bootstrap_leaves_out_the_same_readings(eight: pk.Robot) -> None:
 
 def test_words_are_checked(eight: pk.Robot) -> None:
     _, q, _ = drawn(CORNERS, 7, 20, 0.0)
-    with pytest.raises(pk.ArgumentError, match="slack must be one of keep, drop"):
-        fitted(eight, q, "loose")
+    log = pk.Measurements(q, None, "closure", actuator_sigma=NOISE)
+    with pytest.raises(pk.ArgumentTypeError, match="drop: 'outliers', 'slack' or numbers of rows"):
+        pk.identify(eight, log, FREE, fix=HELD, drop="loose")  # type: ignore[arg-type]
 
 
 def test_the_command_line_leaves_them_out_and_writes_them(run: Any, tmp_path: Path) -> None:

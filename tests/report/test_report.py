@@ -104,7 +104,11 @@ def test_verdict_comes_first_and_names_the_held_out_error(
     ("changes", "state", "words"),
     [
         ({"converged": False}, "bad", "Not calibrated: the least squares did not converge."),
-        ({"warnings": ("z looks like metres",)}, "doubtful", "Doubtful: z looks like metres."),
+        (
+            {"holdout_unreached": "row 3 failed"},
+            "doubtful",
+            "Doubtful: holdout: row 3 failed; left out",
+        ),
         ({"at_bounds": ("offset1",)}, "doubtful", "Doubtful: offset1 ended at a bound"),
         ({"holdout_off": np.empty(0)}, "good", "none was held out"),
     ],
