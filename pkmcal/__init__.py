@@ -59,6 +59,7 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.exceptions import CalibrationWarning as CalibrationWarning
     from pkmcal.exceptions import Error as Error
     from pkmcal.exceptions import FileError as FileError
+    from pkmcal.geometry.carried import Load as Load
     from pkmcal.geometry.geometry import Geometry as Geometry
     from pkmcal.kinematics.dexterity import Dexterity as Dexterity
     from pkmcal.kinematics.dexterity import dexterity as dexterity
@@ -126,6 +127,7 @@ _HOMES = {
     ),
     "controllers.comp_file": ("ScrewTable", "import_comp_file"),
     "controllers.import_printer": ("import_printer",),
+    "geometry.carried": ("Load",),
     "geometry.geometry": ("Geometry",),
     "kinematics.dexterity": ("Dexterity", "dexterity"),
     "kinematics.forward": ("Forward",),

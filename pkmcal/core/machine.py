@@ -20,6 +20,7 @@ from pkmcal.core.library import (
     call,
     ensure,
     pointer,
+    rows,
 )
 from pkmcal.core.path_differences import platform_motion
 from pkmcal.core.poses import rates_of_twists
@@ -398,6 +399,27 @@ class Machine(CoreMachine):
         Cables pull the other way. Of a limb between two points the unit vector along it.
         """
         return self.limbs(slots, pose)[1]
+
+    def work_at_anchors(
+        self, slots: FloatArray, q: FloatArray, force: FloatArray, columns: Int32Array
+    ) -> FloatArray:
+        """Work of forces (N, limbs, 3) on the anchors by numbers at `columns`, (N, columns)."""
+        out = np.zeros((len(q), len(columns)))
+        limb, slot = np.divmod(columns, len(SLOTS))
+        for i in np.unique(limb).tolist():
+            mine, pull = limb == i, np.ascontiguousarray(force[:, i])
+            driver = DRIVERS[self.struct.driver[i]]
+            if driver == "length":  # its anchor is its base point
+                by_number = np.zeros((len(q), len(SLOTS)))
+                by_number[:, :3] = pull
+            else:
+                place = 9 * len(AXES) * i
+                frame = np.array(list(self.struct.frame[place : place + 9]))
+                at = np.ascontiguousarray(q[:, self.struct.actuator[i], None])
+                given = (at, np.ascontiguousarray(slots[..., i, :]), pull, frame)
+                _, by_number = rows(f"{driver}_work", *given, isa=self.isa)
+            out[:, mine] = by_number[:, slot[mine]]
+        return out
 
     def closure_cost(self, slots: FloatArray, pose: FloatArray, q: FloatArray) -> FloatArray:
         """Sum of the squared closures over poses (M, 6) and coordinates (M, n), mm².
