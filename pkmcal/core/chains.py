@@ -375,7 +375,7 @@ AnyMachine = Machine | ChainMachine
 
 def _by_row(slots: FloatArray) -> int:
     """Stride of geometries: one for all rows (1, numbers), or one for each (N, 1, numbers)."""
-    return slots[0].size if slots.ndim == 3 else 0
+    return slots.shape[1] * slots.shape[2] if slots.ndim == 3 else 0
 
 
 def _without_shared(closure: Closure, m: int) -> Closure:

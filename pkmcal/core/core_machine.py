@@ -176,7 +176,7 @@ class CoreMachine(ABC):
         """
         n, shape = len(q), (len(q),) if shape is None else shape
         pose, status, iterations, residual = unwritten(n) if out is None else out
-        stride = slots[0].size if slots.ndim == 3 else 0
+        stride = slots.shape[1] * slots.shape[2] if slots.ndim == 3 else 0
         guess_stride = 6 if guess.ndim == 2 else 0
 
         def run(start: int, stop: int) -> None:
@@ -220,7 +220,7 @@ class CoreMachine(ABC):
         Or of the twist (ω, v) of the platform by them.
         """
         out = np.empty((len(pose), 6, len(columns)))
-        stride = slots[0].size if slots.ndim == 3 else 0
+        stride = slots.shape[1] * slots.shape[2] if slots.ndim == 3 else 0
         given = (len(pose), slots, stride, pose, q, columns, len(columns), twists)
         call(self._ERRORS, self.struct, *given, out, isa=self.isa)
         return out if twists else self.as_written(pose, out, 1)

@@ -214,7 +214,7 @@ class LoadedMachine(CoreMachine):
         given[left] = 0.0
         for _ in range(MOST_STEPS):
             if not len(left):
-                return q, given
+                break
             at, numbers, carried, rows = self._rows(slots, left)
             there = at._given(rows, given[left])
             force = at._forces(rows, pose[left], q[left], there, numbers, carried)
@@ -222,6 +222,8 @@ class LoadedMachine(CoreMachine):
             settled = self._settled(fresh, given[left])
             given[left] = fresh
             left = left[~settled]
+            if not len(left):
+                break
             at, _, _, rows = self._rows(slots, left)
             q[left] = at.inner.inverse(at._given(rows, given[left]), pose[left], about[left])
             lost = ~np.isfinite(q[left]).all(axis=1) | self._too_far(given[left])
