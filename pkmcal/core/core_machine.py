@@ -9,7 +9,7 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 
 from pkmcal._core import ffi
-from pkmcal.arrays import BoolArray, FloatArray, Int32Array
+from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from pkmcal.core.library import MAPS, call, in_threads, part
 
 M = TypeVar("M", bound="CoreMachine")
@@ -113,6 +113,10 @@ class CoreMachine(ABC):
 
     def tensioned(self: M, tension: FloatArray) -> M:
         """The same with tensions of what actuators drive, (n,) or (N, n): without laws it."""
+        return self
+
+    def of_rows(self: M, rows: IntArray) -> M:
+        """The same with the state that it has in some rows of a call: without laws it has none."""
         return self
 
     @abstractmethod

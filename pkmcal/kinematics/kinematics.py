@@ -473,6 +473,7 @@ class Kinematics:
             start = np.tile(self.home, (len(lost), 1))
             start[:, places] = rows[lost][:, places]
             about = near if near is None or near.ndim == 1 else near[lost]
+            parts = self.machine.of_rows(lost), *parts[1:]
             for each, again in zip(found, complete(*parts, start, places, about), strict=True):
                 each[lost] = again
         return found

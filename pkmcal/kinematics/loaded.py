@@ -237,16 +237,17 @@ class LoadedMachine(CoreMachine):
     ) -> tuple[LoadedMachine, FloatArray, FloatArray | None, FloatArray]:
         """The machine, its numbers, what it carries and its geometry, for some rows of a call."""
         mine = slots[rows] if slots.ndim == 3 else slots
-        carried = self.carried
+        at = self.of_rows(rows)
+        return at, self._numbers(mine), at.carried, mine
+
+    def of_rows(self, rows: IntArray) -> LoadedMachine:
+        """The same with the state that it has in some rows of a call."""
+        inner, carried = self.inner.of_rows(rows), self.carried
         if carried is not None and carried.ndim == 2:
             carried = carried[rows]
-        return self._of_rows(rows), self._numbers(mine), carried, mine
-
-    def _of_rows(self, rows: IntArray) -> LoadedMachine:
-        """With the state that the drives have in some rows of a call."""
-        if not isinstance(self.inner, DrivenMachine):
-            return self
-        return self._with(inner=self.inner.of_rows(rows))
+        return self if inner is self.inner and carried is self.carried else self._with(
+            inner=inner, carried=carried
+        )
 
     def _settled(self, fresh: FloatArray, before: FloatArray) -> BoolArray:
         """Where numbers stay, (N,)."""
@@ -512,3 +513,6 @@ class LoadedMachine(CoreMachine):
         """What the limbs are at coordinates (N, n), as `pkmcal.core.machine.Machine.spheres`."""
         assert isinstance(self.inner, Machine | DrivenMachine)
         return self.inner.spheres(self.rigid(slots), q)
+
+
+AnyCompiled = CompiledMachine | LoadedMachine

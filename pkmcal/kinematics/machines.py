@@ -12,11 +12,8 @@ from pkmcal.core.machine import Machine
 from pkmcal.core.pulleys import PulleyMachine, has_bent
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.model import Model
-from pkmcal.kinematics.loaded import LoadedMachine
+from pkmcal.kinematics.loaded import AnyCompiled, LoadedMachine
 from pkmcal.kinematics.pulls import Pulls
-
-
-AnyCompiled = CompiledMachine | LoadedMachine
 
 
 def machine_of(model: Model, slots: FloatArray, length: float) -> AnyCompiled:

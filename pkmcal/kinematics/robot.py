@@ -31,7 +31,7 @@ from pkmcal.kinematics import chain_limits
 from pkmcal.kinematics.complete import completed
 from pkmcal.kinematics.kinematics import Kinematics, Match
 from pkmcal.kinematics.limits import Feasibility, feasibility
-from pkmcal.kinematics.machines import AnyCompiled
+from pkmcal.kinematics.loaded import AnyCompiled
 from pkmcal.modes.assemblies import Assemblies
 from pkmcal.modes.find import assemblies, continue_path, find_modes, nearest_first, pose_distance
 from pkmcal.result import Result
