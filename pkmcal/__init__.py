@@ -67,6 +67,10 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.kinematics.limb_residual import LimbResidual as LimbResidual
     from pkmcal.kinematics.limits import Feasibility as Feasibility
     from pkmcal.kinematics.robot import Robot as Robot
+    from pkmcal.kinematics.stiffness import ComplianceTable as ComplianceTable
+    from pkmcal.kinematics.stiffness import Stiffness as Stiffness
+    from pkmcal.kinematics.stiffness import compliance_table as compliance_table
+    from pkmcal.kinematics.stiffness import stiffness as stiffness
     from pkmcal.kinematics.tensions import Tensions as Tensions
     from pkmcal.kinematics.tensions import tensions as tensions
     from pkmcal.kinematics.workspace import Workspace as Workspace
@@ -134,6 +138,7 @@ _HOMES = {
     "kinematics.limb_residual": ("LimbResidual",),
     "kinematics.limits": ("Feasibility",),
     "kinematics.robot": ("Robot",),
+    "kinematics.stiffness": ("ComplianceTable", "Stiffness", "compliance_table", "stiffness"),
     "kinematics.tensions": ("Tensions", "tensions"),
     "kinematics.workspace": ("Workspace", "sample_poses", "workspace"),
     "loading": ("load", "machines"),
