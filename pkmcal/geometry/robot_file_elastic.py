@@ -108,7 +108,8 @@ def _by_stiffness(table: Table, key: str, spring: Spring, parameters: Parameters
         of.only(("value", "at", "per_length"), "a stiffness")
         value = of[at]
         spring, per_length = _growing(of, spring, parameters)
-    stiffness = of.as_number(at, value, "N/mm", "a number of N/mm, or of N m/rad of an angle")
+    what = "a number of N/mm, or of N m/rad of an angle; what has a name goes into [compliance]"
+    stiffness = of.as_number(at, value, "N/mm", what)
     if not stiffness > 0.0:
         of.fail(at, f"must be positive, found {shown(value)}")
     factor = _PER_MM if spring.unit == "rad" else 1.0
