@@ -14,6 +14,7 @@ import typer
 import pkmcal as pk
 from pkmcal.arrays import FloatArray
 from pkmcal.cli.inputs import Inputs
+from pkmcal.cli.load_options import Payload, PayloadAt, ToolForce, carrying
 from pkmcal.cli.options import Force, Json, ParallelRobot, Seed
 from pkmcal.cli.output import Output, say
 from pkmcal.cli.rows import POSE_UNITS, numbers_on_line
@@ -87,6 +88,9 @@ def compensate(
             metavar="X,Y,Z,A,B,C", help="Of a program: the pose where it begins, mm and deg."
         ),
     ] = None,
+    payload: Payload = None,
+    payload_at: PayloadAt = None,
+    tool_force: ToolForce = None,
     force: Force = False,
     json: Json = False,
 ) -> int:
@@ -107,8 +111,10 @@ def compensate(
         beside = {"orientation": orientation, "match": match, "common": common, "bounds": bounds}
         _refuse(beside | {"seed": seed, "method": method != "exact"}, "a program")
         calibrated = load_parallel(read.robot(str(measured)))
+        calibrated = carrying(calibrated, payload, payload_at, tool_force)
         return _program(machine, calibrated, desired, chord, joints, start, out, read, force, json)
     _refuse({"chord": chord, "joints": joints, "start": start}, "a table of poses")
+    machine = carrying(machine, payload, payload_at, tool_force)
     poses = read_poses(read.file(desired), machine)
     reached = read_reached(read.file(measured))
     output = None if out is None else Output(out, ["corrected.csv"], read, force)

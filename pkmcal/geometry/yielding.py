@@ -11,6 +11,7 @@ from pkmcal.arguments import number
 from pkmcal.arrays import FloatArray
 from pkmcal.core.library import SLOTS
 from pkmcal.exceptions import ArgumentError
+from pkmcal.geometry.carried import CARRIED, Load
 from pkmcal.geometry.elastic import COMPLIANCE, Elastic, Spring, is_elastic
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.model import Model
@@ -74,18 +75,39 @@ def _matching(model: Model, pattern: str) -> list[str]:
     return hits
 
 
+def carrying(model: Model, load: Load) -> Model:
+    """The model of a machine that yields with this payload, which its file may state.
+
+    Raises
+    ------
+    ValueError
+        A load of several rows, or parameters that drive numbers of the stated payload.
+    """
+    assert model.elastic is not None
+    values = load.rows(())
+    numbers = {f"payload.{name}": float(each) for name, each in zip(CARRIED, values, strict=True)}
+    if not model.elastic.payload:
+        model = _with(model, replace(model.elastic, payload=True), {})
+    return model.with_geometry(model.geometry.replace(numbers))
+
+
 def _with_springs(model: Model, fresh: Mapping[str, float]) -> Model:
     rigid, before = model.rigid.geometry, model.elastic or Elastic(())
     place = dict(zip(rigid.names, rigid.slot_index.tolist(), strict=False))
     units = dict(zip(rigid.names, rigid.units, strict=True))
     springs = [*before.springs, *(Spring(name, units[name]) for name in fresh)]
     springs.sort(key=lambda spring: place[spring.number])
-    elastic = replace(before, springs=tuple(springs))
-    old = model.geometry
+    compliance = {COMPLIANCE + name: value for name, value in fresh.items()}
+    return _with(model, replace(before, springs=tuple(springs)), compliance)
+
+
+def _with(model: Model, elastic: Elastic, fresh: Mapping[str, float]) -> Model:
+    """The model with more numbers of what yields and pulls, 0 unless `fresh` states them."""
+    rigid, old = model.rigid.geometry, model.geometry
     ties = {each.name: each.tie for each in old.numbers if is_elastic(each.name)}
     numbers, blank = widened(rigid.numbers, rigid.blank, elastic, ties)
     values = dict.fromkeys(elastic.units, 0.0) | dict(old.items())
-    values |= {COMPLIANCE + name: value for name, value in fresh.items()}
+    values |= fresh
     old_units = dict(zip(old.names, old.units, strict=True))
     parameters = {name: old_units[name] for name in old.parameters}
     geometry = Geometry(numbers, parameters, values, blank)

@@ -24,9 +24,10 @@ from pkmcal.exceptions import ArgumentError
 from pkmcal.files.atomic import write_whole
 from pkmcal.files.toml_lines import Source
 from pkmcal.geometry import box, robot_file
+from pkmcal.geometry.carried import Load
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.model import Model
-from pkmcal.geometry.yielding import yielding
+from pkmcal.geometry.yielding import carrying, yielding
 from pkmcal.kinematics import chain_limits
 from pkmcal.kinematics.complete import completed
 from pkmcal.kinematics.kinematics import Kinematics, Match
@@ -530,6 +531,30 @@ class Robot(Kinematics, Result):
         5e-05
         """
         return Robot(yielding(self.model, compliance))
+
+    def carrying(self, load: Load) -> Robot:
+        """The machine with another payload stated, which `replace` and `save` keep.
+
+        Parameters
+        ----------
+        load : Load
+            One for all rows.
+
+        Raises
+        ------
+        ValueError, TypeError
+            Nothing of the machine yields, so that no load moves it; a load of several rows; a
+            stated payload that follows parameters.
+
+        Examples
+        --------
+        >>> import pkmcal as pk
+        >>> robot = pk.load("hexapod").yielding({"offset*": 5e-5})
+        >>> robot.carrying(pk.Load(mass=5)).geometry["payload.mass"]
+        5.0
+        """
+        self.under(load)  # refuses
+        return Robot(carrying(self.model, load))
 
     def approaching(self, approach: ArrayLike) -> Robot:
         """The robot with actuators that come from a known direction, for laws with backlash.

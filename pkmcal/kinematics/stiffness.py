@@ -283,8 +283,7 @@ def _yielding(robot: Robot) -> Robot:
     require_parallel(robot)
     if not isinstance(robot.machine, LoadedMachine):
         raise ArgumentError(
-            f"robot: nothing of {robot.name} yields: state stiffness or [compliance] in its file,"
-            " or take robot.yielding"
+            f"robot: nothing of {robot.name} yields: state stiffness or [compliance] in its file"
         )
     return robot
 
