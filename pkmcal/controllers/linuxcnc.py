@@ -14,7 +14,7 @@ from pkmcal.arrays import FloatArray
 from pkmcal.controllers import c_loaded, linuxcnc_modules
 from pkmcal.controllers.c_header import text_of as header_of
 from pkmcal.controllers.comp_file import comp_texts, without_laws
-from pkmcal.controllers.loss import Loss
+from pkmcal.controllers.loss import Loss, sag
 from pkmcal.controllers.rendering import rendered
 from pkmcal.core.driven import DrivenMachine
 from pkmcal.core.library import POSE
@@ -112,6 +112,8 @@ def contents(robot: Robot, folder: str) -> tuple[dict[str, str], Loss | None]:
     }
     if module is None:
         return files, None
+    if robot is not robot.rigid:  # their modules know no load
+        return files, sag(robot)
     if module.loss.exact:
         files[f"{module.name}.hal"] = module.lines
     return files, module.loss
