@@ -1,7 +1,7 @@
 """What gravity does to the joints of an arm: torques by masses, and by moments of its links.
 
-The torque on joint i is that of all links behind it. A link moves with its joint, so its weight is a
-constant in its own axes, and moments of links do what masses and centres do together.
+The torque on joint i is that of all links behind it. A link moves with its joint, so that masses
+and centres count as moments that are constant in the axes of the links.
 """
 
 from __future__ import annotations

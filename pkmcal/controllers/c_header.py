@@ -40,9 +40,7 @@ _MOST_ANGLE: dict[Number, float] = {"double": 1e5, "float": 6e3}
 _UNUSED_FRAME = np.zeros(9)
 
 
-def c_header(
-    robot: Robot, path: str | PathLike[str], number: Number = "double"
-) -> Loss | None:
+def c_header(robot: Robot, path: str | PathLike[str], number: Number = "double") -> Loss | None:
     """Write a C99 header with a robot's inverse and forward kinematics and Jacobian.
 
     Its functions are named after the file: ``delta.h`` has ``delta_inverse``, ``delta_forward`` and

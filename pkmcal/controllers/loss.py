@@ -70,7 +70,11 @@ def sag(robot: Robot) -> Loss:
     poses, q, _ = rigid.commanded(sample_poses(rigid, _SAGS, share=0.5))
     off = robot.forward(q, guess=poses).pose[:, :3] - poses[:, :3]
     size = np.nan_to_num(np.linalg.norm(off, axis=1), nan=np.inf)
-    return Loss(rms(size), float(size.max()), "by what yields under the stated load, over half of its workspace")
+    return Loss(
+        rms(size),
+        float(size.max()),
+        "by what yields under the stated load, over half of its workspace",
+    )
 
 
 def fitted(

@@ -46,7 +46,8 @@ def mjcf(robot: Robot, path: str | PathLike[str]) -> Loss | None:
     Returns
     -------
     Loss or None
-        Of a machine that yields, of which the model is the rigid one: how far it sags under what its file states.
+        Of a machine that yields, of which the model is the rigid one: how far it sags under what
+        its file states.
 
     Raises
     ------

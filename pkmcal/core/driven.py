@@ -383,7 +383,9 @@ class DrivenMachine(CoreMachine):
         within = [self._within(int(columns[i])) for i in own]
         ways = [self._offsets[d] for d in drive]  # the way within is there the offset
         asked = np.array(within + ways, dtype=np.int32)
-        work = self._of_limbs.work_at_anchors(self._bare(slots), self.drives(slots, q), force, asked)
+        work = self._of_limbs.work_at_anchors(
+            self._bare(slots), self.drives(slots, q), force, asked
+        )
         out = np.empty((len(q), len(columns)))
         out[:, own] = work[:, : len(own)]
         if of_laws:

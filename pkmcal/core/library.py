@@ -49,6 +49,7 @@ STATUS = {
     lib.PKM_NOT_CLOSED: "does not close",
     lib.PKM_GIVES_WAY: "gives way",
 }
+NOT_CONVERGED: int = lib.PKM_NOT_CONVERGED
 GIVES_WAY: int = lib.PKM_GIVES_WAY
 ROWS_PER_THREAD = 10_000  # fewer do not pay for a thread
 MOST_THREADS = 256  # whatever is asked for

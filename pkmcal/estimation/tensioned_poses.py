@@ -148,7 +148,9 @@ class TensionedPoses(FreePoses):
     def _step_twists(self, robot: Calibratable, states: RowStates) -> FloatArray:
         return np.pad(super()._step_twists(robot, states), ((0, 0), (0, 0), (0, self.cells)))
 
-    def _at(self, robot: Calibratable, states: RowStates) -> tuple[Robot, CableLoad | None, FloatArray]:
+    def _at(
+        self, robot: Calibratable, states: RowStates
+    ) -> tuple[Robot, CableLoad | None, FloatArray]:
         """The machine under the tensions of the states."""
         machine, tension = machine_of(robot), np.asarray(states.tension)
         known = np.isfinite(tension).all(axis=1)
@@ -171,7 +173,9 @@ class TensionedPoses(FreePoses):
     def _gains(self, load: CableLoad | None) -> FloatArray:
         return np.ones(self.cells) if load is None else np.array(load.cells)
 
-    def _left(self, machine: Robot, states: RowStates, load: CableLoad, places: IntArray) -> Equilibrium:
+    def _left(
+        self, machine: Robot, states: RowStates, load: CableLoad, places: IntArray
+    ) -> Equilibrium:
         pulled = np.asarray(states.tension) @ self._drives.T
         return equilibrium(machine, states.pose, pulled, load, places)
 

@@ -82,9 +82,11 @@ class Elastic:
         found |= {f"mass.limb{i + 1}": "kg" for i in self.rods}
         found |= {f"mass.anchor{i + 1}": "kg" for i in self.anchors}
         if self.platform:
-            found |= {"mass.platform": "kg"} | _point("centre.platform", "mm")
+            found["mass.platform"] = "kg"
+            found |= _point("centre.platform", "mm")
         if self.payload:
-            found |= {"payload.mass": "kg"} | _point("payload.centre", "mm")
+            found["payload.mass"] = "kg"
+            found |= _point("payload.centre", "mm")
             found |= _point("payload.force", "N") | _point("payload.moment", "N mm")
         found |= {"gravity.tilt1": "rad", "gravity.tilt2": "rad"}
         for j in range(1, self.balancers + 1):

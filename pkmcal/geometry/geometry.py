@@ -299,12 +299,12 @@ class Geometry:
 
         Parameters that no other number follows go with them.
         """
-        width = self.slots.shape[1] - sum(dropped(number.name) for number in self.numbers)
+        width = self.slots.shape[1] - sum(dropped(each.name) for each in self.numbers)
         kept = []
-        for number, place in zip(self.numbers, self.slot_index.tolist(), strict=True):
+        for each, place in zip(self.numbers, self.slot_index.tolist(), strict=True):
             row, column = divmod(place, self.slots.shape[1])
-            if not dropped(number.name):
-                kept.append(replace(number, place=row * width + column))
+            if not dropped(each.name):
+                kept.append(replace(each, place=row * width + column))
         used = {name for each in kept if each.tie is not None for name in each.tie.drivers}
         drivers = {name for n in self.numbers if n.tie is not None for name in n.tie.drivers}
         units = dict(zip(self.names, self.units, strict=True))

@@ -71,7 +71,8 @@ def read_elastic(
         entries[f"gravity.tilt{k}"] = parameters.entry(term)
     elastic = Elastic(
         tuple(each.spring for each in springs),
-        *masses.values(),
+        rods=masses["mass"],
+        anchors=masses["anchor_mass"],
         platform="platform" in top,
         payload="payload" in top,
         gravity=_gravity(top),

@@ -10,9 +10,14 @@ from pkmcal.geometry.robot_file_elastic import MASSES
 
 
 def elastic_tables(
-    elastic: Elastic, geometry: Geometry
+    elastic: Elastic | None, geometry: Geometry
 ) -> tuple[dict[str, Any], dict[str, dict[str, Any]], list[dict[str, Any]]]:
-    """The keys of the head, the tables, and the balancers, in mm, rad, N and kg."""
+    """The keys of the head, the tables, and the balancers, in mm, rad, N and kg.
+
+    None of them where nothing yields.
+    """
+    if elastic is None:
+        return {}, {}, []
     written = _Written(geometry)
     compliance: dict[str, Any] = {}
     for spring in elastic.springs:
@@ -43,7 +48,10 @@ def elastic_tables(
 
 def limb_masses(elastic: Elastic, geometry: Geometry, i: int) -> dict[str, Any]:
     """The masses of limb `i`, counted from 0, by key."""
-    written, having = _Written(geometry), dict(zip(MASSES, (elastic.rods, elastic.anchors), strict=True))
+    written, having = (
+        _Written(geometry),
+        dict(zip(MASSES, (elastic.rods, elastic.anchors), strict=True)),
+    )
     return {
         key: written(f"mass.{MASSES[key]}{i + 1}") for key, limbs in having.items() if i in limbs
     }

@@ -24,12 +24,12 @@ def text_of(model: Model) -> str:
     head: dict[str, Any] = {"name": model.name, "units": {"length": "mm", "angle": "rad"}}
     if model.closure_tolerance is not None:
         head["closure_tolerance"] = model.closure_tolerance
-    of_elastic, tables, balancers = {}, {}, []
-    if model.elastic is not None:
-        of_elastic, tables, balancers = elastic_tables(model.elastic, model.geometry)
+    of_elastic, tables, balancers = elastic_tables(model.elastic, model.geometry)
     head |= of_elastic
     blocks = [HEADER, lines(head)]
-    blocks += [f"[{key}]\n{lines(table)}" for key, table in (_sections(model) | tables).items() if table]
+    blocks += [
+        f"[{key}]\n{lines(table)}" for key, table in (_sections(model) | tables).items() if table
+    ]
     tail: list[dict[str, Any]] = []
     if model.chains is not None:
         limbs = list(chain_tables(model.chains, model.geometry))

@@ -13,13 +13,13 @@ import numpy as np
 
 from pkmcal.arguments import did_you_mean, words
 from pkmcal.arrays import BoolArray, FloatArray, wrapped
-from pkmcal.kinematics.loaded import AnyCompiled
 from pkmcal.core.library import MAPS, POSE
 from pkmcal.core.machine import Closure
 from pkmcal.core.path_differences import along_path
 from pkmcal.core.poses import rates_of_twists
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.frames import Frames
+from pkmcal.kinematics.loaded import AnyCompiled
 from pkmcal.screw import from_pose
 
 ITERATIONS = 30

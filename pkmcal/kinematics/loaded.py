@@ -14,11 +14,13 @@ from typing import Any
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray
+from pkmcal.core.chains import AnyMachine
 from pkmcal.core.core_machine import CoreMachine, Found, unwritten, written
 from pkmcal.core.driven import CompiledMachine, DrivenMachine
-from pkmcal.core.library import GIVES_WAY, SLOTS
-from pkmcal.core.machine import Closure, Machine
+from pkmcal.core.library import DRIVERS, GIVES_WAY, NOT_CONVERGED, SLOTS
+from pkmcal.core.machine import Closure, Machine, Yielding
 from pkmcal.core.path_differences import actuator_rates, platform_motion
+from pkmcal.core.poses import rates_of_twists
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.elastic import COMPLIANCE, PER_LENGTH
 from pkmcal.kinematics.pulls import Pulls
@@ -77,11 +79,22 @@ class LoadedMachine(CoreMachine):
         self._scale = np.where(angles, 1.0, size)
         self._most = np.where(angles, _MOST_ANGLE, _MOST_LENGTH * size)
         self._compliance = [pulls.place(COMPLIANCE + spring.number) for spring in springs]
+        self._compiled = self._is_compiled(angles)
         self._growing = [
             (k, spring, pulls.place(COMPLIANCE + spring.number + PER_LENGTH))
             for k, spring in enumerate(springs)
             if spring.drive >= 0
         ]
+
+    def _is_compiled(self, angles: BoolArray) -> bool:
+        """Whether the core has it: nothing pulls but at the platform, by weights and forces."""
+        elastic = self.pulls.elastic
+        if type(self.inner) is not Machine or elastic.balancers or elastic.anchors:
+            return False
+        drivers = [DRIVERS[driver] for driver in self.struct.driver[0 : self.struct.limbs]]
+        offsets = all(spring.number.startswith("offset") for spring in elastic.springs)
+        legs = offsets and not angles.any() and set(drivers) == {"length"}
+        return legs or not elastic.rods  # halves of legs at base points do not move with offsets
 
     @property
     def struct(self) -> Any:
@@ -144,9 +157,7 @@ class LoadedMachine(CoreMachine):
                 found[:, k] += numbers[..., place] * (way[:, spring.drive] - spring.at)
         return found
 
-    def yielding_twists(
-        self, slots: FloatArray, pose: FloatArray, q: FloatArray
-    ) -> FloatArray:
+    def yielding_twists(self, slots: FloatArray, pose: FloatArray, q: FloatArray) -> FloatArray:
         """Twists of the platform by the numbers that yield, (N, 6, s), at poses under load."""
         inside = self.under_load(slots, pose, q)
         return self.inner.error_jacobian(inside, pose, q, self._columns, twists=True)
@@ -245,8 +256,10 @@ class LoadedMachine(CoreMachine):
         inner, carried = self.inner.of_rows(rows), self.carried
         if carried is not None and carried.ndim == 2:
             carried = carried[rows]
-        return self if inner is self.inner and carried is self.carried else self._with(
-            inner=inner, carried=carried
+        return (
+            self
+            if inner is self.inner and carried is self.carried
+            else self._with(inner=inner, carried=carried)
         )
 
     def _settled(self, fresh: FloatArray, before: FloatArray) -> BoolArray:
@@ -282,9 +295,54 @@ class LoadedMachine(CoreMachine):
         """Actuator coordinates (N, n) to pose, status, iterations and residual."""
         self._check(len(q))
         found = unwritten(len(q)) if out is None else out
+        if self._compiled and slots.ndim == 2:
+            self._forward_compiled(slots, q, guess, threads, found)
+        else:
+            self.inner.forward(self.rigid(slots), q, guess, threads, None, found)
+            self._settle(slots, q, np.flatnonzero(found[1] == 0), threads, found)
+        if shape is None or len(shape) == 1:
+            return found
         pose, status, iterations, residual = found
-        self.inner.forward(self.rigid(slots), q, guess, threads, None, found)
-        left = np.flatnonzero(status == 0)
+        shaped = pose.reshape(*shape, 6), status.reshape(shape), iterations.reshape(shape)
+        return *shaped, residual.reshape(shape)
+
+    def _forward_compiled(
+        self,
+        slots: FloatArray,
+        q: FloatArray,
+        guess: FloatArray,
+        threads: int | None,
+        found: Found,
+    ) -> None:
+        """`forward` by the core, and row by row of what it does not settle."""
+        assert isinstance(self.inner, Machine)
+        rigid, numbers = self.rigid(slots), self._numbers(slots)
+        compliance = numbers[self._compliance]
+        if self._growing:
+            compliance = self.compliances(slots, q)
+        yielding = Yielding(
+            self._columns,
+            np.ascontiguousarray(compliance),
+            np.ascontiguousarray(self.pulls.summed(numbers, self.carried, rigid)),
+            _SETTLED * self._scale,
+            self._most,
+            MOST_STEPS,
+        )
+        self.inner.forward_loaded(rigid, q, guess, yielding, threads, found)
+        left = np.flatnonzero(found[1] == NOT_CONVERGED)
+        if not len(left):
+            return
+        begin = guess if guess.ndim == 1 else np.ascontiguousarray(guess[left])
+        again = self.inner.forward(rigid, np.ascontiguousarray(q[left]), begin, threads)
+        for each, fresh in zip(found, again, strict=True):
+            each[left] = fresh
+        self._settle(slots, q, left[again[1] == 0], threads, found)
+
+    def _settle(
+        self, slots: FloatArray, q: FloatArray, left: IntArray, threads: int | None, found: Found
+    ) -> None:
+        """Go from rigid poses of some rows to where the numbers that yield stay; in place."""
+        pose, status, iterations, residual = found
         given = np.zeros((len(left), len(self._columns)))
         for _ in range(MOST_STEPS):
             if not len(left):
@@ -312,10 +370,6 @@ class LoadedMachine(CoreMachine):
         status[left] = GIVES_WAY
         failed = status == GIVES_WAY
         pose[failed], residual[failed] = np.nan, np.nan
-        if shape is None or len(shape) == 1:
-            return found
-        shaped = pose.reshape(*shape, 6), status.reshape(shape), iterations.reshape(shape)
-        return *shaped, residual.reshape(shape)
 
     def _check(self, rows: int) -> None:
         if self.carried is not None and self.carried.ndim == 2 and len(self.carried) != rows:
@@ -340,18 +394,16 @@ class LoadedMachine(CoreMachine):
         twists: bool = False,
     ) -> FloatArray:
         """∂pose/∂(numbers at `columns` of the flattened geometry): (N, 6, columns)."""
-        from pkmcal.core.poses import rates_of_twists
-
         inside = self.under_load(slots, pose, q)
-        row, column = np.divmod(columns, self._shape[1])
-        own = np.flatnonzero((column < self._width))
+        column = columns % self._shape[1]
+        own = np.flatnonzero(column < self._width)
         out = np.empty((len(pose), 6, len(columns)))
         out[..., own] = self.inner.error_jacobian(
             inside, pose, q, self._within(columns[own]), twists
         )
         others = np.flatnonzero(column >= self._width)
         if len(others):
-            numbers = column[others] - self._width
+            numbers = (column[others] - self._width).astype(np.intp)
             moved = self._by_numbers(slots, pose, q, inside, numbers)
             out[..., others] = moved if twists else rates_of_twists(pose, moved)
         return out
@@ -407,7 +459,8 @@ class LoadedMachine(CoreMachine):
             there = numbers.copy()
             there[..., place] += sign * step
             ends.append(self._forces(slots, pose, q, inside, there, self.carried))
-        return (ends[0] - ends[1]) / (2.0 * step)
+        slope: FloatArray = (ends[0] - ends[1]) / (2.0 * step)
+        return slope
 
     def closure(self, slots: FloatArray, pose: FloatArray, q: FloatArray) -> Closure:
         """The closure rows and their derivatives at poses (N, 6) and coordinates (N, n)."""
@@ -420,7 +473,7 @@ class LoadedMachine(CoreMachine):
         inside = self.under_load(slots, pose, q)
         if columns is None:
             return self.inner.readings(inside, pose, q)
-        column = np.divmod(columns, self._shape[1])[1]
+        column = columns % self._shape[1]
         own, others = np.flatnonzero(column < self._width), np.flatnonzero(column >= self._width)
         asked = np.union1d(self._within(columns[own]), self._columns).astype(np.int32)
         residual, by_step, by_number = self.inner.readings(inside, pose, q, asked)
@@ -428,7 +481,7 @@ class LoadedMachine(CoreMachine):
         out = np.empty((*residual.shape, len(columns)))
         out[..., own] = by_number[..., np.searchsorted(asked, self._within(columns[own]))]
         if len(others):
-            places = column[others] - self._width
+            places = (column[others] - self._width).astype(np.intp)
             given = self.given_by_numbers(slots, pose, q, inside, places)
             by_spring = by_number[..., np.searchsorted(asked, self._columns)]
             out[..., others] = by_spring @ given
@@ -437,7 +490,8 @@ class LoadedMachine(CoreMachine):
     @property
     def reading_rows(self) -> IntArray:
         """Which row of `readings` is that of each coordinate."""
-        return self.inner.reading_rows
+        within = self.inner.inner if isinstance(self.inner, DrivenMachine) else self.inner
+        return within.reading_rows
 
     def rates(
         self, slots: FloatArray, motion: FloatArray, q: FloatArray
@@ -461,7 +515,7 @@ class LoadedMachine(CoreMachine):
         return platform_motion(forward, pose, q, q1, q2, scale)
 
     def closure_cost(self, slots: FloatArray, pose: FloatArray, q: FloatArray) -> FloatArray:
-        """Sum of the squared closures over poses (M, 6) and coordinates (M, n), for N geometries."""
+        """Sum of the squared closures over poses (M, 6) and q (M, n), for N geometries."""
         costs = [(self.closure(each, pose, q).residual ** 2).sum() for each in slots]
         return np.array(costs)
 
@@ -478,9 +532,7 @@ class LoadedMachine(CoreMachine):
 
     # what the load does not change ----------------------------------------------------------------
 
-    def bare(
-        self, slots: FloatArray, q: FloatArray
-    ) -> tuple[CompiledMachine, FloatArray, FloatArray]:
+    def bare(self, slots: FloatArray, q: FloatArray) -> tuple[AnyMachine, FloatArray, FloatArray]:
         """The machine without drive laws and load, its geometry, its coordinates at q (N, n)."""
         return self.inner.bare(self.rigid(slots), q)
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray, furthest_axis
 from pkmcal.core.library import SLOTS
-from pkmcal.geometry.elastic import Elastic
 from pkmcal.geometry.carried import CARRIED
+from pkmcal.geometry.elastic import Elastic
 from pkmcal.screw import from_pose
 
 _BASE, _PLATFORM = SLOTS.index("base.x"), SLOTS.index("platform.x")
@@ -29,9 +29,7 @@ class Pulls:
         Poses of the machine's own frame in the user's, and of the tool in the platform's own.
     """
 
-    def __init__(
-        self, elastic: Elastic, base: FloatArray | None, tool: FloatArray | None
-    ) -> None:
+    def __init__(self, elastic: Elastic, base: FloatArray | None, tool: FloatArray | None) -> None:
         self.elastic = elastic
         self._index = {name: i for i, name in enumerate(elastic.units)}
         self._inward = from_pose(_NOWHERE if base is None else base)[:3, :3].T
@@ -52,29 +50,56 @@ class Pulls:
         """N per kg in the machine's own axes, (..., 3)."""
         t1, t2 = self._of("gravity.tilt1", numbers), self._of("gravity.tilt2", numbers)
         down = np.stack([np.sin(t2), -np.sin(t1) * np.cos(t2), np.cos(t1) * np.cos(t2)], axis=-1)
-        return self._strength * (down @ self._down.T) @ self._inward.T
+        turned: FloatArray = self._strength * (down @ self._down.T) @ self._inward.T
+        return turned
+
+    def summed(
+        self, numbers: FloatArray, carried: FloatArray | None, slots: FloatArray
+    ) -> FloatArray:
+        """All weights and the force at the tool, as numbers of the platform alone, (16,) or (N, 16).
+
+        Σ m r [kg mm], Σ m [kg], gravity [N/kg], the tool [mm], the force there [N], a moment
+        [N mm]: points in the platform's own axes, the rest in the machine's. `numbers` are those
+        of `Elastic`, (k,) or (N, k), `carried` the numbers of a load that stands in for the stated
+        payload, (10,) or (N, 10), `slots` those of the limbs.
+        """
+        load = self._payload(numbers) if carried is None else carried
+        tool, turned = self._tool[:3, 3], self._tool[:3, :3]
+        masses = [load[..., 0]]
+        moments = [load[..., :1] * (tool + load[..., 1:4] @ turned.T)]
+        if self.elastic.platform:
+            masses.append(self._of("mass.platform", numbers))
+            moments.append(masses[-1][..., None] * self._point("centre.platform", numbers))
+        for i in self.elastic.rods:
+            masses.append(0.5 * self._of(f"mass.limb{i + 1}", numbers))
+            joint = slots[..., i, _PLATFORM : _PLATFORM + 3]
+            moments.append(masses[-1][..., None] * joint)
+        parts = (
+            sum(moments[1:], moments[0]),
+            sum(masses[1:], masses[0])[..., None],
+            self.gravity(numbers),
+            tool,
+            load[..., 4:7] @ self._inward.T,
+            load[..., 7:10] @ self._inward.T,
+        )
+        shape = np.broadcast_shapes(*(part.shape[:-1] for part in parts))
+        each = [np.broadcast_to(part, (*shape, part.shape[-1])) for part in parts]
+        whole: FloatArray = np.concatenate(each, axis=-1)
+        return whole
 
     def wrench(
         self, numbers: FloatArray, carried: FloatArray | None, pose: FloatArray, slots: FloatArray
     ) -> FloatArray:
         """Moment about the platform's origin and force on it, (N, 6), at own poses (N, 6).
 
-        `numbers` are those of `Elastic`, (k,) or (N, k), `carried` the numbers of a load that
-        stands in for the stated payload, (10,) or (N, 10), `slots` those of the limbs.
+        With the arguments of `summed`, and the balancers.
         """
         turned = from_pose(pose)[:, :3, :3]
-        g, load = self.gravity(numbers), self._payload(numbers) if carried is None else carried
-        tool = self._tool[:3, 3]
-        centre = tool + load[..., 1:4] @ self._tool[:3, :3].T
-        force, moment = load[..., 4:7] @ self._inward.T, load[..., 7:10] @ self._inward.T
-        found = _at(turned, centre, load[..., :1] * g) + _at(turned, tool, force)
-        found[:, :3] += moment
-        if self.elastic.platform:
-            mass = self._of("mass.platform", numbers)
-            found += _at(turned, self._point("centre.platform", numbers), mass[..., None] * g)
-        for i in self.elastic.rods:
-            half = 0.5 * self._of(f"mass.limb{i + 1}", numbers)
-            found += _at(turned, slots[..., i, _PLATFORM : _PLATFORM + 3], half[..., None] * g)
+        pull = self.summed(numbers, carried, slots)
+        found = _at(turned, pull[..., 0:3], pull[..., 4:7])
+        found[:, 3:] = pull[..., 3:4] * pull[..., 4:7]
+        found += _at(turned, pull[..., 7:10], pull[..., 10:13])
+        found[:, :3] += pull[..., 13:16]
         for j in range(1, self.elastic.balancers + 1):
             found += self._balancer(j, numbers, turned, pose[:, :3])
         return found

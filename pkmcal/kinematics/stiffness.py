@@ -294,7 +294,7 @@ def _carried(robot: Robot, load: Load | None) -> Load:
         load.rows(())
         return load
     names = [f"payload.{name}" for name in CARRIED]
-    values = [robot.geometry[name] if name in robot.geometry else 0.0 for name in names]
+    values = [dict(robot.geometry.items()).get(name, 0.0) for name in names]
     return Load(values[0], values[1:4], values[4:7], values[7:10])
 
 

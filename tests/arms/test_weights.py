@@ -18,10 +18,11 @@ CENTRES = np.array(
     [[0, 0, 200], [10, 20, 420], [50, 0, 620], [200, 0, 630], [320, 0, 640], [380, 10, 630]], float
 )
 HOME = [450, 0, 630, 0, 0, 0]
+SLIDING = ["prismatic", *["revolute"] * 4, "prismatic"]
 ARMS = {
     "six turning": pk.SerialArm(AXES, POINTS, HOME),
-    "with slides": pk.SerialArm(AXES, POINTS, HOME, kinds=["prismatic", *["revolute"] * 4, "prismatic"]),
-}  # fmt: skip
+    "with slides": pk.SerialArm(AXES, POINTS, HOME, kinds=SLIDING),
+}
 
 
 def thetas(arm: pk.SerialArm, count: int = 20) -> np.ndarray:
@@ -118,7 +119,8 @@ def test_inertials_of_a_urdf_file_hang_on_its_joints(tmp_path: Path) -> None:
         <link name="tool"/><link name="finger"><inertial><mass value="0.5"/></inertial></link>
         <joint name="j1" type="revolute"><parent link="world"/><child link="a"/>
           <origin xyz="0 0 0.5"/><axis xyz="0 1 0"/><limit lower="-1" upper="1"/></joint>
-        <joint name="f" type="fixed"><parent link="a"/><child link="box"/><origin xyz="0.4 0 0"/></joint>
+        <joint name="f" type="fixed"><parent link="a"/><child link="box"/>
+          <origin xyz="0.4 0 0"/></joint>
         <joint name="j2" type="continuous"><parent link="a"/><child link="b"/>
           <origin xyz="0.3 0 0" rpy="0 1.5707963267948966 0"/><axis xyz="0 0 1"/></joint>
         <joint name="t" type="fixed"><parent link="b"/><child link="tool"/></joint>

@@ -28,7 +28,7 @@ int forward(const double *q, const double *load, double *pose)
 
 
 def heavy() -> pk.Robot:
-    """Weights, balancers, gravity that leans, frames, and legs that yield more where they are long."""
+    """Weights, balancers, gravity that leans, frames, legs that yield more where they are long."""
     keys = {"stiffness": 4e3, "mass": 6.0}
     grows = {"stiffness": {"value": 3e3, "at": 700.0, "per_length": 2e-7}, "gain": -1.01}
     return hexapod(
@@ -112,7 +112,7 @@ def test_a_header_says_where_a_machine_gives_way(tmp_path: Path) -> None:
     robot = pk.load("hexapod").yielding({"offset*": 1.0 / 30.0})
     library = compiled(robot, tmp_path)
     load = pk.Load(mass=100.0, centre=(20.0, -10.0, 50.0))
-    pose, row = robot.home + [150.0, 100.0, 50.0, 0.2, 0.1, 0.3], load.rows(())
+    pose, row = robot.home + np.array([150, 100, 50, 0.2, 0.1, 0.3]), load.rows(())
     q = robot.rigid.inverse(pose)
     assert robot.forward(q, guess=pose, load=load).status == 6
     status, after = run(library.forward, q, row, pose)

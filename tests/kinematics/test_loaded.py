@@ -12,6 +12,7 @@ from pkmcal.geometry import robot_file, robot_file_writer
 from tests.robots import hexapod
 
 G = 9.80665
+SHIFT, SPAN = np.array([0, 0, 50, 0, 0, 0]), np.array([150, 150, 100, 0.3, 0.3, 0.3])
 # machines of every kind of limb and map, and what yields of them
 CASES = [
     ("hexapod", {"offset*": 1e-4}),
@@ -80,7 +81,9 @@ def test_a_loaded_machine_rests_where_its_energy_is_stationary(
                 number = rigid.geometry[name] + e + sign * step
                 pose = at.replace({name: number}).forward(q[i], guess=found.pose[i]).pose
                 way = pk.screw.from_pose(pose)[:3, :3] @ pk.screw.from_pose(again)[:3, :3].T
-                turn = np.array([way[2, 1] - way[1, 2], way[0, 2] - way[2, 0], way[1, 0] - way[0, 1]])
+                turn = np.array(
+                    [way[2, 1] - way[1, 2], way[0, 2] - way[2, 0], way[1, 0] - way[0, 1]]
+                )
                 ends.append(energy_of_load(load, i, pose, turn / 2))
             by_difference = (ends[0] - ends[1]) / (2 * step)
             scale = np.abs(force[i]).max() + 1.0
@@ -126,14 +129,14 @@ def heavy_hexapod() -> pk.Robot:
 
 def heavy_slider() -> pk.Robot:
     """Rods on carriages with weights, and what may yield of them."""
-    return _with_limbs("rbt-6t03p", {"stiffness": 2e3, "rod_stiffness": 4e3, "mass": 0.5,
-                                     "anchor_mass": 2.0}, {"slider*": 1e-7, "base*": 1e-5})  # fmt: skip
+    keys = {"stiffness": 2e3, "rod_stiffness": 4e3, "mass": 0.5, "anchor_mass": 2.0}
+    return _with_limbs("rbt-6t03p", keys, {"slider*": 1e-7, "base*": 1e-5})
 
 
 def heavy_crank() -> pk.Robot:
     """Rods on cranks with weights, and what may yield of them."""
-    return _with_limbs("6-rus", {"stiffness": 5e3, "rod_stiffness": 8e3, "mass": 0.4,
-                                 "anchor_mass": 1.5}, {"axis*": 1e-8, "crank*": 1e-5})  # fmt: skip
+    keys = {"stiffness": 5e3, "rod_stiffness": 8e3, "mass": 0.4, "anchor_mass": 1.5}
+    return _with_limbs("6-rus", keys, {"axis*": 1e-8, "crank*": 1e-5})
 
 
 def _with_limbs(name: str, keys: dict[str, float], compliance: dict[str, float]) -> pk.Robot:
@@ -153,8 +156,10 @@ def potential(robot: pk.Robot, rigid: pk.Robot, q: np.ndarray, pose: np.ndarray)
     g, numbers = rigid.geometry, robot.geometry
     base = pk.screw.from_pose(_frame(robot.model.base_frame))
     tool = pk.screw.from_pose(pose)
-    own = np.linalg.inv(base) @ tool @ np.linalg.inv(
-        pk.screw.from_pose(_frame(robot.model.tool_frame))
+    own = (
+        np.linalg.inv(base)
+        @ tool
+        @ np.linalg.inv(pk.screw.from_pose(_frame(robot.model.tool_frame)))
     )
     down = np.array(robot.model.elastic.gravity)
     down = _tilted(down, numbers["gravity.tilt1"], numbers["gravity.tilt2"])
@@ -172,7 +177,7 @@ def potential(robot: pk.Robot, rigid: pk.Robot, q: np.ndarray, pose: np.ndarray)
     spheres = rigid.machine.spheres(rigid.slots, q[None])[0]
     for i in range(len(robot.model.limbs)):
         rod = numbers[f"mass.limb{i + 1}"]
-        anchor = numbers[f"mass.anchor{i + 1}"] if f"mass.anchor{i + 1}" in numbers else 0.0
+        anchor = dict(numbers.items()).get(f"mass.anchor{i + 1}", 0.0)
         joint = np.array([g[f"platform{i + 1}.{axis}"] for axis in "xyz"])
         total += of(0.5 * rod, carried(joint)) + of(0.5 * rod + anchor, spheres[i, 3:6])
     total += of(numbers["mass.platform"], carried(at("centre.platform")))
@@ -235,7 +240,7 @@ def test_legs_of_a_hexapod_give_as_tendons_of_mujoco() -> None:
     engine = pytest.importorskip("mujoco")
     robot = pk.load("hexapod")
     rng = np.random.default_rng(0)
-    poses = robot.home + [0, 0, 50, 0, 0, 0] + rng.uniform(-1, 1, (6, 6)) * [150, 150, 100, .3, .3, .3]  # fmt: skip
+    poses = robot.home + SHIFT + rng.uniform(-1, 1, (6, 6)) * SPAN
     q, at = robot.inverse(poses), np.array([20.0, -10.0, 50.0])
     load = pk.Load(mass=1000.0 / G, centre=at)
     for stiffness in (2e4, 1e3, 300.0):
@@ -332,7 +337,7 @@ def test_what_first_order_misses_grows_with_the_square_of_the_sag(
 def test_first_order_of_a_hexapod_on_soft_legs_is_off_as_stated() -> None:
     robot = pk.load("hexapod").yielding({"offset*": 1.0 / 5e3})
     rng = np.random.default_rng(0)
-    poses = robot.home + [0, 0, 50, 0, 0, 0] + rng.uniform(-1, 1, (30, 6)) * [150, 150, 100, .3, .3, .3]  # fmt: skip
+    poses = robot.home + SHIFT + rng.uniform(-1, 1, (30, 6)) * SPAN
     load = pk.Load(mass=1000.0 / G, centre=(20.0, -10.0, 50.0))
     q = robot.rigid.inverse(poses)
     exact = robot.forward(q, guess=poses, load=load).pose - poses
@@ -455,7 +460,9 @@ def test_a_compliance_table_of_a_stiff_machine_is_its_matrix() -> None:
     robot = pk.load("linear-delta").yielding({"offset*": 1e-7})
     table = pk.compliance_table(robot, robot.home, rated=100.0)
     diagonal = np.diagonal(pk.stiffness(robot, robot.home).compliance)[3:]
-    assert table.compliance == pytest.approx(np.repeat(diagonal, 2)[:, None].repeat(10, 1), rel=1e-4)
+    assert table.compliance == pytest.approx(
+        np.repeat(diagonal, 2)[:, None].repeat(10, 1), rel=1e-4
+    )
     assert np.isinf(np.diagonal(pk.stiffness(robot, robot.home).matrix)[:3]).all()
     assert "static compliance up to 100 N" in str(table)
 
