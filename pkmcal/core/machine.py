@@ -267,8 +267,7 @@ class Machine(CoreMachine):
         def run(start: int, stop: int) -> None:
             begin = part(guess, start, stop) if guess_stride else guess
             each = [
-                (part(array, start, stop) if stride else array, stride)
-                for array, stride in of_rows
+                (part(array, start, stop) if stride else array, stride) for array, stride in of_rows
             ]
             given = (stop - start, slots, part(q, start, stop), begin, guess_stride)
             written = [part(array, start, stop) for array in found]

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from pkmcal.arrays import Unit
+from pkmcal.geometry.load import is_of_load
 
 GRAVITY = (0.0, 0.0, -9.80665)  # m/s², in the axes of the base
 COMPLIANCE, PER_LENGTH = "compliance.", ".per_length"
@@ -97,6 +98,11 @@ class Elastic:
 
 def _point(name: str, unit: Unit) -> dict[str, Unit]:
     return {f"{name}.{axis}": unit for axis in "xyz"}
+
+
+def is_kinematic(name: str) -> bool:
+    """Whether a number is one of the limbs or ties some, and none of loads or of what yields."""
+    return not is_elastic(name) and not is_of_load(name)
 
 
 def is_elastic(name: str) -> bool:

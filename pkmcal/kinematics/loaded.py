@@ -334,8 +334,8 @@ class LoadedMachine(CoreMachine):
             return
         begin = guess if guess.ndim == 1 else np.ascontiguousarray(guess[left])
         again = self.inner.forward(rigid, np.ascontiguousarray(q[left]), begin, threads)
-        for each, fresh in zip(found, again, strict=True):
-            each[left] = fresh
+        pose, status, iterations, residual = found
+        pose[left], status[left], iterations[left], residual[left] = again
         self._settle(slots, q, left[again[1] == 0], threads, found)
 
     def _settle(
