@@ -480,3 +480,25 @@ def test_what_does_not_yield_has_no_stiffness() -> None:
     yields = robot.yielding({"offset*": 1e-4})
     with pytest.raises(pk.ArgumentError, match="ask its `rigid`"):
         yields.forward_all(robot.inverse(robot.home))
+
+
+def test_actuators_of_a_moving_machine_follow_its_sag() -> None:
+    """Velocities under load are the differences of the loaded inverse."""
+    robot = pk.load("hexapod").yielding({"offset*": 1e-4}).carrying(pk.Load(mass=50.0))
+    way, motion = np.array([10.0, 0.0, 5.0, 0.0, 0.0, 0.0]), np.zeros((3, 4, 4))
+    motion[0], motion[1, :3, 3] = pk.screw.from_pose(robot.home), way[:3]
+    velocity, _ = robot.rates(motion)
+    ends = [robot.inverse(robot.home + sign * 1e-3 * way) for sign in (1, -1)]
+    assert np.abs(velocity - (ends[0] - ends[1]) / 2e-3).max() < 1e-8
+    assert np.abs(velocity - robot.rigid.rates(motion)[0]).max() > 1e-4
+
+
+def test_a_carried_load_is_that_of_a_call_and_is_kept() -> None:
+    robot = pk.load("hexapod").yielding({"offset*": 1e-4})
+    load = pk.Load(mass=20.0, centre=(5.0, 0.0, 40.0), force=(0.0, 30.0, 0.0))
+    carrying = robot.carrying(load).replace({"base1.x": robot.geometry["base1.x"] + 0.1})
+    other = robot.replace({"base1.x": robot.geometry["base1.x"] + 0.1})
+    assert np.array_equal(carrying.inverse(robot.home), other.inverse(robot.home, load=load))
+    assert carrying.geometry["payload.force.y"] == 30.0
+    with pytest.raises(pk.ArgumentError):
+        robot.carrying(pk.Load(mass=[1.0, 2.0]))
