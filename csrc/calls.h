@@ -25,6 +25,19 @@ int CALL(forward_machines)(const pkm_machine *machine, ptrdiff_t n, const double
                            ptrdiff_t places, const double *q, const double *guess, double *pose,
                            int32_t *status, int32_t *iterations, double *residual);
 
+/* The same of one machine, with as many rows as free coordinates, in which numbers at `column` yield
+ * under what pulls at the platform: by compliance (columns, or n x columns by its stride) [mm/N, rad/(N
+ * mm)]. pull (16, or n x 16 by its stride) is sum of m r [kg mm], sum of m [kg], gravity [N/kg], a point
+ * of the platform [mm], the force there [N], a moment [N mm]. A number rests that changes by less than
+ * `settled`, and gives too much beyond `most` (columns each). PKM_NOT_CONVERGED, with the rigid pose
+ * or a later one, where that was not so within `steps`. */
+int CALL(forward_loaded)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
+                         const double *q, const double *guess, ptrdiff_t guess_stride,
+                         const int32_t *column, int columns, const double *compliance,
+                         ptrdiff_t compliance_stride, const double *pull, ptrdiff_t pull_stride,
+                         const double *settled, const double *most, int steps, double *pose,
+                         int32_t *status, int32_t *iterations, double *residual);
+
 /* pose (n, 6) -> dq/dfree (n, actuators, m), limb by limb. */
 int CALL(jacobian)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
                    ptrdiff_t geometry_stride, const double *pose, double *jacobian);

@@ -71,35 +71,41 @@ INLINE const double *frame_of_axis(const pkm_machine *machine, int i, int axis)
     return machine->frame + 9 * (AXES * i + axis);
 }
 
+/* What of limb i follows from its numbers alone. */
+INLINE void prepare_limb(const pkm_machine *machine, int i, limb_numbers *one)
+{
+    real F[9];
+    one->per_gain = 1.0 / one->g[GAIN];
+    switch (machine->driver[i]) {
+#define CASE(NAME, name, MOVES, STRETCHES)                                                        \
+    case DRIVER_##NAME:                                                                           \
+        if (!MOVES) break;                                                                        \
+        fill_frame(frame_of_axis(machine, i, 0), F);                                              \
+        FN(name##_directions)(one->g, F, one->first, one->second);                                \
+        break;
+        EACH_DRIVER(CASE)
+        NO_OTHER_CASE;
+#undef CASE
+    }
+#define PREPARE(name, K, ROWS)                                                                    \
+    if (machine->rows[i] & (ROWS)) {                                                              \
+        fill_frame(frame_of_axis(machine, i, K), F);                                              \
+        FN(name##_axis)(one->g, F, one->axis[K]);                                                 \
+    }
+    EACH_AXIS(PREPARE)
+#undef PREPARE
+}
+
 SHARED void prepare_limbs(const pkm_machine *machine, const double *geometry, ptrdiff_t stride,
                           const ptrdiff_t *row, limb_numbers *limb)
 {
     for (int i = 0; i < machine->limbs; i++) {
         limb_numbers *one = &limb[i];
-        real F[9];
         if (stride)
             gather_row(geometry + i * SLOTS, stride, SLOTS, row, one->g);
         else
             for (int s = 0; s < SLOTS; s++) one->g[s] = fill(geometry[i * SLOTS + s]);
-        one->per_gain = 1.0 / one->g[GAIN];
-        switch (machine->driver[i]) {
-#define CASE(NAME, name, MOVES, STRETCHES)                                                        \
-        case DRIVER_##NAME:                                                                       \
-            if (!MOVES) break;                                                                    \
-            fill_frame(frame_of_axis(machine, i, 0), F);                                          \
-            FN(name##_directions)(one->g, F, one->first, one->second);                            \
-            break;
-            EACH_DRIVER(CASE)
-            NO_OTHER_CASE;
-#undef CASE
-        }
-#define PREPARE(name, K, ROWS)                                                                    \
-        if (machine->rows[i] & (ROWS)) {                                                          \
-            fill_frame(frame_of_axis(machine, i, K), F);                                          \
-            FN(name##_axis)(one->g, F, one->axis[K]);                                             \
-        }
-        EACH_AXIS(PREPARE)
-#undef PREPARE
+        prepare_limb(machine, i, one);
     }
 }
 

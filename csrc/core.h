@@ -5,6 +5,7 @@
 #include "elimination.h"
 #include "forward.h"
 #include "inspect.h"
+#include "loaded.h"
 #include "motion.h"
 #include "frames.h"
 #include "pso.h"

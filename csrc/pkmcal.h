@@ -14,7 +14,7 @@
 /* cffi begin */
 enum { PKM_MAX_LIMBS = 24, PKM_MAX_ROWS = 48 };
 enum { PKM_OK, PKM_NOT_CONVERGED, PKM_SINGULAR, PKM_INFEASIBLE, PKM_INVALID,
-       PKM_NOT_CLOSED };
+       PKM_NOT_CLOSED, PKM_GIVES_WAY };
 enum { PKM_BAD_MACHINE = -1, PKM_BAD_COLUMN = -2, PKM_BAD_SWARM = -3 };
 
 /* A machine: its pose map and its limbs, without the numbers that calibration changes. */

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from math import prod
 from typing import Literal
 
-from . import frames, laws, measured, pulleys, tpr2tps
+from . import frames, laws, limb_functions, limbs, measured, pulleys, tpr2tps
 from .emit import Function
 
 Given = Literal["each", "either", "shared"]
@@ -33,12 +33,15 @@ class Input:
         A row for each row of the call, or one for all, or either, by a stride.
     used : int or None
         How many of them the formula takes, all by default.
+    scalar : bool
+        Whether the formula takes the number itself, and no array of one.
     """
 
     name: str
     width: int
     given: Given = "each"
     used: int | None = None
+    scalar: bool = False
 
 
 @dataclass(frozen=True)
@@ -99,7 +102,7 @@ class Call:
             lines.append(
                 f"        gather_row({each.name}, {stride}, {used}, row, lane_{each.name});"
             )
-        passed = [f"lane_{each.name}" for each in self.inputs]
+        passed = [f"lane_{each.name}" + "[0]" * each.scalar for each in self.inputs]
         passed += [f"lane_{out.name}" for out in self.outputs]
         lines.append(_wrapped(f"        {self.lanes}(", passed, ");"))
         for out in self.outputs:
@@ -128,7 +131,7 @@ def formula(
     made = function()
     called = names.split()
     inputs = [
-        Input(own, argument.size or 1, (given or {}).get(own, "each"))
+        Input(own, argument.size or 1, (given or {}).get(own, "each"), scalar=not argument.size)
         for own, argument in zip(called, made.inputs, strict=False)
     ]
     outputs = [Output(own, shape) for own, shape in zip(called[len(inputs) :], shapes, strict=True)]
@@ -189,6 +192,7 @@ def calls() -> list[Call]:
                 ((), (3,), (3,), (3, 3), (), (3,), (3,)), {"own": "either", "frame": "either"}),
         formula("strand", "straight parts of cables: their lengths, by the end and twice by it",
                 pulleys.strand, "joint length by_joint bend", ((), (3,), (3, 3))),
+        *(_work_at_anchor(driver) for driver in (limbs.SLIDER, limbs.CRANK)),
         formula("tpr2tps_lengths", "2TPR&2TPS: eq. 8", tpr2tps.lengths, "size free lengths",
                 ((4,),), {"size": "shared"}),
         formula("tpr2tps_jacobian", "2TPR&2TPS: eq. 12", tpr2tps.by_free, "size free jacobian",
@@ -208,6 +212,16 @@ def calls() -> list[Call]:
              "joint_motion_row", (Input("error", 6), Input("point", 3)),
              (Output("motion", (4, 4)),)),
     ]  # fmt: skip
+
+
+def _work_at_anchor(driver: limbs.Driver) -> Call:
+    """What a force at the anchor of a limb does as its numbers change."""
+    return formula(
+        f"{driver.name}_work", f"work of forces at the anchors of a limb with a {driver.name}, by"
+        " the actuator and by the limb's numbers",
+        lambda: limb_functions.carry(driver), "q numbers force frame by_q by_number",
+        ((), (len(limbs.SLOTS),)), {"numbers": "either", "frame": "shared"},
+    )  # fmt: skip
 
 
 def prototypes() -> str:

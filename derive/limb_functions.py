@@ -102,7 +102,7 @@ def _radius(driver: Driver) -> Function:
     return f
 
 
-def _carry(driver: Driver) -> Function:
+def carry(driver: Driver) -> Function:
     """What a row that pulls at the anchor asks of the actuator and of the limb's numbers."""
     f = LimbFunction(
         f"{driver.name}_carry",
@@ -274,7 +274,7 @@ def _axis(axis: Axis) -> Function:
 def functions() -> list[Function]:
     """The emitted functions of every driver and row."""
     made = [*_basics(), _sphere(), *map(_axis, AXES)]
-    for step in (_prepare, _anchor, _radius, _inverse, _derivatives, _carry):
+    for step in (_prepare, _anchor, _radius, _inverse, _derivatives, carry):
         made += [step(driver) for driver in DRIVERS]
     made += [_constraint(row, known) for row in CONSTRAINTS for known in (True, False)]
     return made + [_moving(row) for row in (None, *CONSTRAINTS)]

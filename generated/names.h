@@ -44,6 +44,8 @@ enum { MAP_SPATIAL, MAP_TRANSLATION, MAP_PLANAR, MAP_2TPR2TPS, MAP_SPHERICAL, MA
     "law_segment x:5 -> error: by_x:3\n" \
     "pulley own:3* frame:9* joint:3 -> length: by_joint:3 by_own:3 bend:3,3 swivel: swivel_by_joint:3 swivel_by_own:3\n" \
     "strand joint:3 -> length: by_joint:3 bend:3,3\n" \
+    "slider_work q:1 numbers:16* force:3 frame:9! -> by_q: by_number:16\n" \
+    "crank_work q:1 numbers:16* force:3 frame:9! -> by_q: by_number:16\n" \
     "tpr2tps_lengths size:6! free:4 -> lengths:4\n" \
     "tpr2tps_jacobian size:6! free:4 -> jacobian:4,4\n" \
     "exp twist:6 -> motion:4,4\n" \

@@ -1,5 +1,5 @@
 /* Generated from derive/calls.py by `python -m derive`; never edited by hand.
- * derivation 74cc92fa5a24087f
+ * derivation f2cc784edfe39458
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 /* a (n, 6) or (6), b (n, 6) or (6) -> out (n, 6): A followed by B. */
@@ -85,6 +85,18 @@ int CALL(pulley)(ptrdiff_t n, const double *own, ptrdiff_t own_stride, const dou
 /* joint (n, 3) -> length (n), by_joint (n, 3), bend (n, 3, 3): straight parts of cables: their
  * lengths, by the end and twice by it. */
 int CALL(strand)(ptrdiff_t n, const double *joint, double *length, double *by_joint, double *bend);
+
+/* q (n, 1), numbers (n, 16) or (16), force (n, 3), frame (9) -> by_q (n), by_number (n, 16):
+ * work of forces at the anchors of a limb with a slider, by the actuator and by the limb's
+ * numbers. */
+int CALL(slider_work)(ptrdiff_t n, const double *q, const double *numbers, ptrdiff_t numbers_stride,
+                      const double *force, const double *frame, double *by_q, double *by_number);
+
+/* q (n, 1), numbers (n, 16) or (16), force (n, 3), frame (9) -> by_q (n), by_number (n, 16):
+ * work of forces at the anchors of a limb with a crank, by the actuator and by the limb's
+ * numbers. */
+int CALL(crank_work)(ptrdiff_t n, const double *q, const double *numbers, ptrdiff_t numbers_stride,
+                     const double *force, const double *frame, double *by_q, double *by_number);
 
 /* size (6), free (n, 4) -> lengths (n, 4): 2TPR&2TPS: eq. 8. */
 int CALL(tpr2tps_lengths)(ptrdiff_t n, const double *size, const double *free, double *lengths);

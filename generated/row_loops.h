@@ -1,5 +1,5 @@
 /* Generated from derive/calls.py by `python -m derive`; never edited by hand.
- * derivation 74cc92fa5a24087f
+ * derivation f2cc784edfe39458
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 int CALL(compose)(ptrdiff_t n, const double *a, ptrdiff_t a_stride, const double *b,
@@ -282,6 +282,45 @@ int CALL(strand)(ptrdiff_t n, const double *joint, double *length, double *by_jo
         scatter_row(lane_length, 1, length, 1, row, count);
         scatter_row(lane_by_joint, 3, by_joint, 3, row, count);
         scatter_row(lane_bend, 9, bend, 9, row, count);
+    }
+    return 0;
+}
+
+int CALL(slider_work)(ptrdiff_t n, const double *q, const double *numbers, ptrdiff_t numbers_stride,
+                      const double *force, const double *frame, double *by_q, double *by_number)
+{
+    real lane_frame[9];
+    for (int k = 0; k < 9; k++) lane_frame[k] = fill(frame[k]);
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        real lane_q[1], lane_numbers[16], lane_force[3], lane_by_q[1], lane_by_number[16];
+        const int count = block_rows(first, n, row);
+        gather_row(q, 1, 1, row, lane_q);
+        gather_row(numbers, numbers_stride, 16, row, lane_numbers);
+        gather_row(force, 3, 3, row, lane_force);
+        FN(slider_carry)(lane_q[0], lane_numbers, lane_force, lane_frame, lane_by_q,
+                         lane_by_number);
+        scatter_row(lane_by_q, 1, by_q, 1, row, count);
+        scatter_row(lane_by_number, 16, by_number, 16, row, count);
+    }
+    return 0;
+}
+
+int CALL(crank_work)(ptrdiff_t n, const double *q, const double *numbers, ptrdiff_t numbers_stride,
+                     const double *force, const double *frame, double *by_q, double *by_number)
+{
+    real lane_frame[9];
+    for (int k = 0; k < 9; k++) lane_frame[k] = fill(frame[k]);
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        real lane_q[1], lane_numbers[16], lane_force[3], lane_by_q[1], lane_by_number[16];
+        const int count = block_rows(first, n, row);
+        gather_row(q, 1, 1, row, lane_q);
+        gather_row(numbers, numbers_stride, 16, row, lane_numbers);
+        gather_row(force, 3, 3, row, lane_force);
+        FN(crank_carry)(lane_q[0], lane_numbers, lane_force, lane_frame, lane_by_q, lane_by_number);
+        scatter_row(lane_by_q, 1, by_q, 1, row, count);
+        scatter_row(lane_by_number, 16, by_number, 16, row, count);
     }
     return 0;
 }

@@ -66,6 +66,7 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.fitted.datum import Datum as Datum
     from pkmcal.fitted.distances import Distances as Distances
     from pkmcal.fitted.slack import SlackCable as SlackCable
+    from pkmcal.geometry.carried import Load as Load
     from pkmcal.geometry.geometry import Geometry as Geometry
     from pkmcal.kinematics.dexterity import Dexterity as Dexterity
     from pkmcal.kinematics.dexterity import dexterity as dexterity
@@ -73,6 +74,10 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.kinematics.limb_residual import LimbResidual as LimbResidual
     from pkmcal.kinematics.limits import Feasibility as Feasibility
     from pkmcal.kinematics.robot import Robot as Robot
+    from pkmcal.kinematics.stiffness import ComplianceTable as ComplianceTable
+    from pkmcal.kinematics.stiffness import Stiffness as Stiffness
+    from pkmcal.kinematics.stiffness import compliance_table as compliance_table
+    from pkmcal.kinematics.stiffness import stiffness as stiffness
     from pkmcal.kinematics.tensions import Tensions as Tensions
     from pkmcal.kinematics.tensions import tensions as tensions
     from pkmcal.kinematics.workspace import Workspace as Workspace
@@ -136,12 +141,14 @@ _HOMES = {
     ),
     "controllers.comp_file": ("ScrewTable", "import_comp_file"),
     "controllers.import_printer": ("import_printer",),
+    "geometry.carried": ("Load",),
     "geometry.geometry": ("Geometry",),
     "kinematics.dexterity": ("Dexterity", "dexterity"),
     "kinematics.forward": ("Forward",),
     "kinematics.limb_residual": ("LimbResidual",),
     "kinematics.limits": ("Feasibility",),
     "kinematics.robot": ("Robot",),
+    "kinematics.stiffness": ("ComplianceTable", "Stiffness", "compliance_table", "stiffness"),
     "kinematics.tensions": ("Tensions", "tensions"),
     "kinematics.workspace": ("Workspace", "sample_poses", "workspace"),
     "loading": ("load", "machines"),

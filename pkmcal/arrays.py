@@ -19,7 +19,10 @@ Int32Array = NDArray[np.int32]  # what the core writes
 Int64Array = NDArray[np.int64]
 TextArray = NDArray[np.str_]
 
-Unit = Literal["mm", "rad", "1", "1/mm", "1/rad", "1/mm2", "1/N", "N"]
+Unit = Literal[
+    "mm", "rad", "1", "1/mm", "1/rad", "1/mm2", "1/N", "N",
+    "N mm", "N/mm", "mm/N", "rad/(N mm)", "kg",
+]  # fmt: skip
 
 _ALIKE = 1e-6  # share by which entries of a direction differ that are not equal
 

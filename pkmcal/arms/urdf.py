@@ -84,6 +84,33 @@ def write(
     write_whole(path, f'<?xml version="1.0" encoding="utf-8"?>\n{before}{text}\n{behind}')
 
 
+def weights(
+    path: str | os.PathLike[str], tip: str | None, base: str | None
+) -> tuple[FloatArray, FloatArray]:
+    """What hangs on each joint of the chain from base to tip, by the file's ``inertial``.
+
+    Masses (n,), kg, and their centres (n, 3) with all joints at zero, in the base, mm. What joints
+    beside the chain carry hangs on the chain's last joint before them; 0 where nothing is stated.
+    """
+    robot, (_, joints, _) = urdf_file.read(path), _chain(path, tip, base)
+    above = {joint.child: joint for joint in robot.joints}
+    number = {joint.name: k for k, joint in enumerate(joints)}
+    masses, moments = np.zeros(len(joints)), np.zeros((len(joints), 3))
+    for link, inertial in robot.inertials.items():
+        place, owner = np.array([*inertial.centre, 1.0]), link
+        while owner in above and above[owner].name not in number:
+            place = above[owner].origin @ place
+            owner = above[owner].parent
+        if owner not in above:  # before the first joint
+            continue
+        k = number[above[owner].name]
+        masses[k] += inertial.mass
+        moments[k] += inertial.mass * (joints[k].origin @ place)[:3]
+    carried = masses > 0.0
+    moments[carried] /= masses[carried, None]
+    return masses, moments
+
+
 def _text(numbers: FloatArray) -> str:
     return " ".join(repr(float(number)) for number in numbers)
 

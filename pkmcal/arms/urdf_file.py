@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import xml.etree.ElementTree as ElementTree
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from os import PathLike
 
@@ -44,12 +44,21 @@ class Element:
 
 
 @dataclass(frozen=True)
+class Inertial:
+    """Mass of a link, kg, and its centre in the link's frame, mm."""
+
+    mass: float
+    centre: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
 class File:
-    """The robot's name, its links, and its joints."""
+    """The robot's name, its links, and its joints; what links weigh that say so."""
 
     name: str
     links: tuple[str, ...]
     joints: tuple[Element, ...]
+    inertials: Mapping[str, Inertial]
 
 
 def read(path: str | PathLike[str]) -> File:
@@ -77,7 +86,7 @@ def read(path: str | PathLike[str]) -> File:
                 )
         if joint.parent == joint.child:
             raise FileError(f"{path}: joint {joint.name!r} joins {joint.child!r} with itself")
-    return File(_attribute(path, root, "name"), links, joints)
+    return File(_attribute(path, root, "name"), links, joints, dict(_inertials(path, root)))
 
 
 def tree(path: str | PathLike[str]) -> ElementTree.Element:
@@ -167,6 +176,25 @@ def _joint(path: str | PathLike[str], joint: ElementTree.Element) -> Element:
         follows = f"{mimic.get('multiplier', '1')} · {_attribute(place, mimic, 'joint')}"
     limits = _limits(place, joint, kind)
     return Element(name, kind, ends[0], ends[1], np.asarray(home), axis, follows, limits)
+
+
+def _inertials(
+    path: str | PathLike[str], root: ElementTree.Element
+) -> Iterator[tuple[str, Inertial]]:
+    for link in root.findall("link"):
+        place = f"{path}: link {link.get('name')!r}"
+        inertial = _only(place, link, "inertial")
+        if inertial is None:
+            continue
+        mass = _only(place, inertial, "mass")
+        try:
+            value = float("nan" if mass is None else mass.get("value", "nan"))
+        except ValueError:
+            value = math.nan
+        if not 0.0 <= value < math.inf:
+            raise FileError(f"{place}: <inertial> must have a mass of 0 or more")
+        x, y, z = _three(place, _only(place, inertial, "origin"), "xyz")
+        yield str(link.get("name")), Inertial(value, (_METRE * x, _METRE * y, _METRE * z))
 
 
 def _limits(place: str, joint: ElementTree.Element, kind: str) -> tuple[float, float]:

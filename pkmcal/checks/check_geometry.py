@@ -29,6 +29,7 @@ from pkmcal.checks.layout import (
     swapped,
     unlike,
 )
+from pkmcal.checks.loads import sags
 from pkmcal.display import Table
 from pkmcal.kinematics.pulled import on_cables
 from pkmcal.kinematics.robot import Robot
@@ -123,6 +124,7 @@ def check_geometry(robot: Robot | SerialArm) -> GeometryCheck:
         singular  home, or every pose, is singular; affinely similar base and platform
         drive     drive laws that may turn back within their stroke: they have no inverse
         tension   a home at which not all cables can pull
+        load      a sag at home that no machine has: stiffness or masses in other units
         stated    numbers that contradict what the robot file states
         ========  ==========================================================================
 
@@ -167,7 +169,8 @@ def check_geometry(robot: Robot | SerialArm) -> GeometryCheck:
             checks = CHAIN_CHECKS
         elif on_cables(robot):
             checks = CABLE_CHECKS
-        found = [finding for check in checks for finding in check(robot)]
+        found = [finding for check in checks for finding in check(robot.rigid)]
+        found += sags(robot)
     return GeometryCheck(robot, tuple(found))
 
 

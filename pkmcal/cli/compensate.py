@@ -16,6 +16,7 @@ import pkmcal as pk
 from pkmcal.arguments import word
 from pkmcal.arrays import FloatArray
 from pkmcal.cli.inputs import Inputs
+from pkmcal.cli.load_options import Payload, PayloadAt, ToolForce, carrying
 from pkmcal.cli.options import Force, Json, ParallelRobot, Seed
 from pkmcal.cli.output import Output, say
 from pkmcal.cli.rows import POSE_UNITS, numbers_on_line
@@ -102,6 +103,9 @@ def compensate(
             help="Of a program: a word that moves nothing and changes no mode and no coordinate.",
         ),
     ] = None,
+    payload: Payload = None,
+    payload_at: PayloadAt = None,
+    tool_force: ToolForce = None,
     force: Force = False,
     json: Json = False,
 ) -> int:
@@ -127,6 +131,7 @@ def compensate(
         if firmware is None:
             known = ", ".join(get_args(GcodeFirmware))
             raise ArgumentError(f"--firmware is needed, words mean different things: {known}")
+        calibrated = carrying(calibrated, payload, payload_at, tool_force)
         program = read.file(desired)
         correct = partial(
             pk.compensate_program,
@@ -142,6 +147,7 @@ def compensate(
         return _program(desired, Output(out, [desired.name], read, force), json, correct)
     of_programs = {"chord": chord, "joints": joints, "start": start}
     _refuse(of_programs | {"firmware": firmware, "pass": passed}, "a table of poses")
+    machine = carrying(machine, payload, payload_at, tool_force)
     poses = read_poses(read.file(desired), machine)
     reached = read_reached(read.file(measured))
     output = None if out is None else Output(out, ["corrected.csv"], read, force)

@@ -135,11 +135,11 @@ def _write(
     """Write one file, and say what is lost."""
     match target:
         case "c":
-            pk.export.c_header(machine, path, _number(number))
+            return pk.export.c_header(machine, path, _number(number))
         case "mjcf":
-            pk.export.mjcf(machine, path)
+            return pk.export.mjcf(machine, path)
         case "fmu":
-            pk.export.fmu(machine, path)
+            return pk.export.fmu(machine, path)
         case "klipper":
             return pk.export.klipper(machine, path, config, project)
         case "maslow":

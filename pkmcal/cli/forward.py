@@ -10,10 +10,12 @@ import typer
 
 import pkmcal as pk
 from pkmcal.cli.inputs import Inputs
+from pkmcal.cli.load_options import Payload, PayloadAt, ToolForce, carrying
 from pkmcal.cli.options import Force, Json, Radians, RobotOrArm
 from pkmcal.cli.output import Output, say
 from pkmcal.cli.rows import POSE_UNITS, numbers_on_line, table
 from pkmcal.core.library import POSE, STATUS
+from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.kinematics.reading_units import reading_units
 from pkmcal.measurements.command_csv import read_commands
@@ -32,6 +34,9 @@ def forward(
     ],
     rad: Radians = False,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Write poses.csv.")] = None,
+    payload: Payload = None,
+    payload_at: PayloadAt = None,
+    tool_force: ToolForce = None,
     force: Force = False,
     json: Json = False,
 ) -> int:
@@ -42,7 +47,12 @@ def forward(
     Example: pkmcal forward 2tpr2tps 450,452,400,405
     """
     read = Inputs()
-    machine = as_machine(pk.load(read.robot(robot)))
+    loaded = pk.load(read.robot(robot))
+    if isinstance(loaded, pk.Robot):
+        loaded = carrying(loaded, payload, payload_at, tool_force)
+    elif payload or payload_at or tool_force:
+        raise ArgumentError(f"robot: {loaded.name} is an arm, which carries no payload here")
+    machine = as_machine(loaded)
     units = reading_units(machine)
     row = numbers_on_line("actuators", actuators, units, rad)
     q = read_commands(read.file(actuators), units) if row is None else row

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from pkmcal.cli.inputs import Inputs
+from pkmcal.cli.load_options import Payload, PayloadAt, ToolForce, carrying
 from pkmcal.cli.options import Force, Json, ParallelRobot, Radians
 from pkmcal.cli.output import Output, say
 from pkmcal.cli.rows import POSE_UNITS, numbers_on_line, table
@@ -39,6 +40,9 @@ def inverse(
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Write commands.csv, exact.")
     ] = None,
+    payload: Payload = None,
+    payload_at: PayloadAt = None,
+    tool_force: ToolForce = None,
     force: Force = False,
     json: Json = False,
 ) -> int:
@@ -53,7 +57,7 @@ def inverse(
     Example: pkmcal inverse hexapod 20,-10,860,5,0,3
     """
     read = Inputs()
-    machine = load_parallel(read.robot(robot))
+    machine = carrying(load_parallel(read.robot(robot)), payload, payload_at, tool_force)
     row = numbers_on_line("poses", poses, POSE_UNITS, rad)
     rows = read_poses(read.file(poses), machine) if row is None else row
     output = None if out is None else Output(out, ["commands.csv"], read, force)

@@ -18,6 +18,7 @@ _VERBS = {  # where each is: file and function
     "show": "show.show",
     "new": "new.new",
     "check": "check.check",
+    "stiffness": "stiffness.stiffness",
     "sensitivity": "sensitivity.sensitivity",
     "tolerance": "tolerance.tolerance",
     "plan": "plan.plan",
@@ -28,7 +29,7 @@ _VERBS = {  # where each is: file and function
     "inverse": "inverse.inverse",
     "forward": "forward.forward",
 }
-_SIGNED = ("inverse", "forward")  # an argument may be -330,-330,-330
+_SIGNED = ("inverse", "forward", "stiffness")  # an argument may be -330,-330,-330
 
 
 class _Verbs(TyperGroup):

@@ -12,9 +12,10 @@ import numpy as np
 from pkmcal.arguments import path as as_path
 from pkmcal.arguments import word
 from pkmcal.arrays import FloatArray
-from pkmcal.controllers import c_chains, c_limbs, c_source
+from pkmcal.controllers import c_chains, c_limbs, c_loaded, c_source
 from pkmcal.controllers.c_source import Number
 from pkmcal.controllers.laws import require_no_tackles
+from pkmcal.controllers.loss import Loss
 from pkmcal.controllers.rendering import rendered
 from pkmcal.core.driven import DrivenMachine
 from pkmcal.core.laws import MOST_STEPS, ROUNDING, LawNumbers
@@ -39,7 +40,7 @@ _MOST_ANGLE: dict[Number, float] = {"double": 1e5, "float": 6e3}
 _UNUSED_FRAME = np.zeros(9)
 
 
-def c_header(robot: Robot, path: str | PathLike[str], number: Number = "double") -> None:
+def c_header(robot: Robot, path: str | PathLike[str], number: Number = "double") -> Loss | None:
     """Write a C99 header with a robot's inverse and forward kinematics and Jacobian.
 
     Its functions are named after the file: ``delta.h`` has ``delta_inverse``, ``delta_forward`` and
@@ -55,6 +56,14 @@ def c_header(robot: Robot, path: str | PathLike[str], number: Number = "double")
         Where to write; an existing file is replaced, whole or not at all.
     number : {"double", "float"}
         Type of its numbers.
+
+    Returns
+    -------
+    Loss or None
+        Of a machine that yields: by how much what the header holds of it is off under the payload
+        that its file states. None where nothing yields, or only offsets (legs, screws, cranks) of
+        limbs in closed form do: then ``delta_inverse_loaded`` and ``delta_forward_loaded`` take a
+        load as well, and the other functions are those of the machine where nothing pulls.
 
     Raises
     ------
@@ -76,6 +85,7 @@ def c_header(robot: Robot, path: str | PathLike[str], number: Number = "double")
     require_parallel(robot)
     path = as_path("path", path)
     write_whole(path, text_of(robot, prefix_of(path), number))
+    return c_loaded.not_held(robot)
 
 
 def prefix_of(path: Path) -> str:
@@ -87,6 +97,8 @@ def prefix_of(path: Path) -> str:
 def text_of(robot: Robot, prefix: str, number: Number) -> str:
     """The header whose names begin with `prefix`."""
     word("number", number, ("double", "float"))
+    loaded = c_loaded.contents(robot, number) if c_loaded.holds(robot) else None
+    robot = robot.rigid
     machine = robot.machine
     require_no_tackles(robot, "a header")
     if robot.model.chains is not None and machine.rows != machine.m:
@@ -94,11 +106,13 @@ def text_of(robot: Robot, prefix: str, number: Number) -> str:
             f"robot: {robot.name} has {machine.rows} closures for {machine.m} free coordinates;"
             " a header holds chains with as many of both"
         )
-    return rendered("robot.h.jinja", _contents(robot, prefix, number))
+    return rendered("robot.h.jinja", _contents(robot, loaded, prefix, number))
 
 
-def _contents(robot: Robot, prefix: str, number: Number) -> dict[str, Any]:
-    """What the template says, by the names in it."""
+def _contents(
+    robot: Robot, loaded: dict[str, Any] | None, prefix: str, number: Number
+) -> dict[str, Any]:
+    """What the template says, by the names in it; `loaded` is what it says of loads."""
     machine, model = robot.machine, robot.model
     map = model.map
     laws = _laws(robot)
@@ -108,6 +122,8 @@ def _contents(robot: Robot, prefix: str, number: Number) -> dict[str, Any]:
     needed = ["pose_frame", *([] if robot.frames.trivial else ["pose_compose"])]
     needed += [f"map_{map}_{part}" for part in _MAP_PARTS] + called
     needed += _LAWS[: 2 if laws else 0] + _LAWS[2:3] * _any(laws, "waves")
+    if loaded is not None:
+        needed += [f"{driver['name']}_carry" for driver in own["drivers"]]
     functions = c_source.with_callees(needed + _LAWS[3:] * _any(laws, "points"))
     state = int(
         re.findall(r"state\[(\d+)\]", c_source.functions()[f"map_{map}_frame"].arguments)[0]
@@ -122,6 +138,7 @@ def _contents(robot: Robot, prefix: str, number: Number) -> dict[str, Any]:
     size = machine.struct.size
     inverse, step, unknowns = own.pop("calls")
     says: dict[str, Any] = own | {
+        "load": loaded,
         "title": re.sub(r"[^ -~]|\*/|/\*", "?", robot.name),
         "P": prefix,
         "U": prefix.upper(),

@@ -20,6 +20,7 @@ from pkmcal.arguments import path as as_path
 from pkmcal.controllers.arm_tree import xml_of
 from pkmcal.controllers.c_header import prefix_of
 from pkmcal.controllers.c_header import text_of as header_of
+from pkmcal.controllers.loss import Loss, sag
 from pkmcal.controllers.rendering import rendered
 from pkmcal.core.library import COORDINATE_UNITS, POSE
 from pkmcal.exceptions import ArgumentError
@@ -31,7 +32,7 @@ _HEAD = '<?xml version="1.0" encoding="UTF-8"?>\n'
 _DATE = (1980, 1, 1, 0, 0, 0)  # of files in the archive: the same robot is the same bytes
 
 
-def fmu(robot: Robot, path: str | PathLike[str]) -> None:
+def fmu(robot: Robot, path: str | PathLike[str]) -> Loss | None:
     """Write a robot's kinematics as an FMU of FMI 3.0 for co-simulation, with its C sources.
 
     Inputs are the actuator coordinates ``q1`` and so on, and a pose ``to.x`` … ``to.gamma``;
@@ -46,6 +47,12 @@ def fmu(robot: Robot, path: str | PathLike[str]) -> None:
     path : str or path
         Where to write; an existing file is replaced, whole or not at all. Its name is that of the
         model.
+
+    Returns
+    -------
+    Loss or None
+        Of a machine that yields, of which the model is the rigid one: how far it sags under what
+        its file states.
 
     Raises
     ------
@@ -64,7 +71,8 @@ def fmu(robot: Robot, path: str | PathLike[str]) -> None:
     ['modelDescription.xml', 'sources/buildDescription.xml']
     """
     require_parallel(robot)
-    path = as_path("path", path)
+    lost = None if robot is robot.rigid else sag(robot)
+    robot, path = robot.rigid, as_path("path", path)
     name = prefix_of(path)
     header = header_of(robot, name, "double")
     if not np.isfinite(robot.inverse(robot.home)).all():
@@ -83,6 +91,7 @@ def fmu(robot: Robot, path: str | PathLike[str]) -> None:
         for file, text in files.items():
             made.writestr(zipfile.ZipInfo(file, _DATE), text, zipfile.ZIP_DEFLATED)
     write_whole(path, archive.getvalue())
+    return lost
 
 
 def _description(robot: Robot, name: str, token: str) -> str:

@@ -11,10 +11,10 @@ import numpy as np
 from pkmcal.arguments import instance
 from pkmcal.arguments import path as as_path
 from pkmcal.arrays import FloatArray
-from pkmcal.controllers import linuxcnc_modules
+from pkmcal.controllers import c_loaded, linuxcnc_modules
 from pkmcal.controllers.c_header import text_of as header_of
 from pkmcal.controllers.comp_file import comp_texts, without_laws
-from pkmcal.controllers.loss import Loss
+from pkmcal.controllers.loss import Loss, sag
 from pkmcal.controllers.rendering import rendered
 from pkmcal.core.driven import DrivenMachine
 from pkmcal.core.library import POSE
@@ -31,6 +31,10 @@ _DIFFERENCE = 1e-6  # of the machine's size, or rad
 
 def linuxcnc(robot: Robot, folder: str | PathLike[str]) -> Loss | None:
     """Write a robot for LinuxCNC: its kinematics, and a headless simulation that runs them.
+
+    The component of a machine that yields has pins for its load, ``payload.mass`` [kg],
+    ``payload.x`` … ``payload.z`` [mm] and ``force.x`` … ``force.z`` [N], which begin with what its
+    file states.
 
     Of a folder ``mill``: ``pkm_mill.c``, a component for halcompile with the numbers of this robot
     folded in, ``mill.ini`` and ``mill.hal``; where drive laws are tables and backlash alone,
@@ -53,7 +57,8 @@ def linuxcnc(robot: Robot, folder: str | PathLike[str]) -> Loss | None:
     Raises
     ------
     ValueError
-        A machine that the component cannot hold, or backlash beside a drive law that is no table;
+        A machine that the component cannot hold, one of which more yields than offsets of limbs in
+        closed form, or backlash beside a drive law that is no table;
         nothing is written.
     OSError
         The folder cannot be written.
@@ -84,6 +89,11 @@ def contents(robot: Robot, folder: str) -> tuple[dict[str, str], Loss | None]:
             f"folder must have a name of 1 to {_LONGEST} letters, for LinuxCNC's own are short,"
             f" found {folder!r}"
         )
+    if (off := c_loaded.not_held(robot)) is not None:
+        raise ArgumentError(
+            f"robot: more of {robot.name} yields than the offsets of its limbs, which a component"
+            f" cannot hold: {off}; its `rigid` can be exported"
+        )
     tabled = robot
     if robot.model.chains is not None:
         _require_no_backlash(robot)
@@ -102,6 +112,8 @@ def contents(robot: Robot, folder: str) -> tuple[dict[str, str], Loss | None]:
     }
     if module is None:
         return files, None
+    if robot is not robot.rigid:  # their modules know no load
+        return files, sag(robot)
     if module.loss.exact:
         files[f"{module.name}.hal"] = module.lines
     return files, module.loss
@@ -153,6 +165,7 @@ def _contents(robot: Robot, name: str) -> dict[str, Any]:
         "name": name,
         "module": module,
         "header": header,
+        "load": robot.model.elastic is not None,
         "P": module,
         "U": module.upper(),
         "n": n,

@@ -11,7 +11,9 @@ from scipy.optimize import least_squares
 from pkmcal.arrays import FloatArray, rms
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.robot import Robot
+from pkmcal.kinematics.workspace import sample_poses
 
+_SAGS = 200  # poses
 EXACT = 1e-6  # mm: firmware numbers have six decimals
 
 
@@ -60,6 +62,19 @@ def loss(model: Robot, q: FloatArray, poses: FloatArray, over: str) -> Loss:
     """How far a model is from poses; infinitely where it has none."""
     off = np.nan_to_num(np.linalg.norm(off_by(model, q, poses), axis=1), nan=np.inf)
     return Loss(rms(off), float(off.max()), over)
+
+
+def sag(robot: Robot) -> Loss:
+    """How far a machine that yields is from the rigid one; infinitely where it gives way."""
+    rigid = robot.rigid
+    poses, q, _ = rigid.commanded(sample_poses(rigid, _SAGS, share=0.5))
+    off = robot.forward(q, guess=poses).pose[:, :3] - poses[:, :3]
+    size = np.nan_to_num(np.linalg.norm(off, axis=1), nan=np.inf)
+    return Loss(
+        rms(size),
+        float(size.max()),
+        "by what yields under the stated load, over half of its workspace",
+    )
 
 
 def fitted(

@@ -12,6 +12,7 @@ from pkmcal.arguments import path as as_path
 from pkmcal.arrays import FloatArray, furthest_axis
 from pkmcal.controllers.c_limbs import prepared
 from pkmcal.controllers.laws import require_plain_limbs
+from pkmcal.controllers.loss import Loss, sag
 from pkmcal.core.library import POSE
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.atomic import write_whole
@@ -28,7 +29,7 @@ _ROWS = {"UPS": (), "PUS": (), "RUS": (), "RPS": ("base_plane",)}
 _METRE = 1e-3
 
 
-def mjcf(robot: Robot, path: str | PathLike[str]) -> None:
+def mjcf(robot: Robot, path: str | PathLike[str]) -> Loss | None:
     """Write a robot as an MJCF file of MuJoCo.
 
     The model stands in the home pose, or beside it where errors of the geometry do not let it close
@@ -42,6 +43,12 @@ def mjcf(robot: Robot, path: str | PathLike[str]) -> None:
         Limbs of the kinds UPS, RPS, PUS and RUS.
     path : str or path
         Where to write; an existing file is replaced, whole or not at all.
+
+    Returns
+    -------
+    Loss or None
+        Of a machine that yields, of which the model is the rigid one: how far it sags under what
+        its file states.
 
     Raises
     ------
@@ -59,7 +66,8 @@ def mjcf(robot: Robot, path: str | PathLike[str]) -> None:
     6
     """
     require_parallel(robot)
-    write_whole(as_path("path", path), text_of(robot))
+    write_whole(as_path("path", path), text_of(robot.rigid))
+    return None if robot is robot.rigid else sag(robot)
 
 
 def text_of(robot: Robot) -> str:

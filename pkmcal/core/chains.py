@@ -208,7 +208,8 @@ class ChainMachine(CoreMachine):
             found = self._all_at_once(slots, pose)
         else:
             found = np.empty((len(pose), self.actuators))
-            call("chain_inverse", self.struct, len(pose), slots, 0, pose, found, isa=self.isa)
+            given = (len(pose), slots, _by_row(slots), pose, found)
+            call("chain_inverse", self.struct, *given, isa=self.isa)
         return written(known_rows(self.nearest_turns(slots, found, near)), out)
 
     def _all_at_once(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
@@ -217,7 +218,7 @@ class ChainMachine(CoreMachine):
         arms[self._angles] = self.layout.length
         arms[:-1] *= np.abs(self.slopes(slots, pose[:1])[0]) if len(pose) else 1.0
         guess = screws.pose(np.ascontiguousarray(self.layout.home.reshape(1, 16)))[0]
-        q = self.at_drives(slots, self.layout.zero)
+        q = self.at_drives(slots, self.layout.zero[None])[0]
         home, status, _, _ = self.forward(slots, q[None], guess, 1)
         if status[0] != 0:
             return np.full((len(pose), self.actuators), np.nan)
@@ -246,8 +247,8 @@ class ChainMachine(CoreMachine):
 
     def drives(self, slots: FloatArray, q: FloatArray) -> FloatArray:
         """What the actuators read with gain and offset, (N, n)."""
-        place, numbers = self.layout.drive_place, slots.ravel()
-        found: FloatArray = numbers[place + 1] * q + numbers[place]
+        place, numbers = self.layout.drive_place, slots.reshape(-1, slots.shape[-1])
+        found: FloatArray = numbers[:, place + 1] * q + numbers[:, place]
         return found
 
     @property
@@ -267,8 +268,8 @@ class ChainMachine(CoreMachine):
 
     def at_drives(self, slots: FloatArray, way: FloatArray) -> FloatArray:
         """What the actuators read (N, n) at q̃ (N, n)."""
-        place, numbers = self.layout.drive_place, slots.ravel()
-        q: FloatArray = (way - numbers[place]) / numbers[place + 1]
+        place, numbers = self.layout.drive_place, slots.reshape(-1, slots.shape[-1])
+        q: FloatArray = (way - numbers[:, place]) / numbers[:, place + 1]
         return q
 
     def jacobian(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
@@ -284,7 +285,7 @@ class ChainMachine(CoreMachine):
     ) -> FloatArray:
         """∂pose/∂q at poses (N, 6): (N, 6, n), or of the twist (ω, v) of the platform by them."""
         out = np.empty((len(pose), 6, self.actuators))
-        given = (len(pose), slots, 0, pose, q, None, self.actuators, twists)
+        given = (len(pose), slots, _by_row(slots), pose, q, None, self.actuators, twists)
         call("chain_response", self.struct, *given, out, isa=self.isa)
         return out if twists else self.as_written(pose, out, 1)
 
@@ -303,8 +304,7 @@ class ChainMachine(CoreMachine):
             np.empty((n, 6)),
             np.empty((n, 6, self.m)),
         )
-        stride = slots[0].size if slots.ndim == 3 else 0
-        call("chain_closure", self.struct, n, slots, stride, pose, q, *out, isa=self.isa)
+        call("chain_closure", self.struct, n, slots, _by_row(slots), pose, q, *out, isa=self.isa)
         self.as_written(pose, out.by_free, 2)
         return _without_shared(out, self.m) if shared else out
 
@@ -319,7 +319,7 @@ class ChainMachine(CoreMachine):
         layout = self.layout
         passive = np.empty((len(pose), self.struct.passive))
         frames = np.empty((len(pose), len(layout.member) + len(layout.ball), 12))
-        given = (len(pose), slots, 0, pose, q)
+        given = (len(pose), slots, _by_row(slots), pose, q)
         call("chain_frames", self.struct, *given, passive, frames, isa=self.isa)
         return passive, frames
 
@@ -371,6 +371,11 @@ class ChainMachine(CoreMachine):
 
 
 AnyMachine = Machine | ChainMachine
+
+
+def _by_row(slots: FloatArray) -> int:
+    """Stride of geometries: one for all rows (1, numbers), or one for each (N, 1, numbers)."""
+    return slots.shape[1] * slots.shape[2] if slots.ndim == 3 else 0
 
 
 def _without_shared(closure: Closure, m: int) -> Closure:

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 
 from pkmcal._core import ffi
-from pkmcal.arrays import BoolArray, FloatArray, Int32Array
+from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from pkmcal.core.library import MAPS, call, in_threads, part
 
 M = TypeVar("M", bound="CoreMachine")
@@ -115,6 +115,10 @@ class CoreMachine(ABC):
         """The same with tensions of what actuators drive, (n,) or (N, n): without laws it."""
         return self
 
+    def of_rows(self: M, rows: IntArray) -> M:
+        """The same with the state that it has in some rows of a call: without laws it has none."""
+        return self
+
     @abstractmethod
     def turns(self, slots: FloatArray) -> FloatArray:
         """How far each actuator goes in a whole turn, (n,); infinite where it is no angle."""
@@ -176,7 +180,7 @@ class CoreMachine(ABC):
         """
         n, shape = len(q), (len(q),) if shape is None else shape
         pose, status, iterations, residual = unwritten(n) if out is None else out
-        stride = slots[0].size if slots.ndim == 3 else 0
+        stride = slots.shape[1] * slots.shape[2] if slots.ndim == 3 else 0
         guess_stride = 6 if guess.ndim == 2 else 0
 
         def run(start: int, stop: int) -> None:
@@ -220,7 +224,7 @@ class CoreMachine(ABC):
         Or of the twist (ω, v) of the platform by them.
         """
         out = np.empty((len(pose), 6, len(columns)))
-        stride = slots[0].size if slots.ndim == 3 else 0
+        stride = slots.shape[1] * slots.shape[2] if slots.ndim == 3 else 0
         given = (len(pose), slots, stride, pose, q, columns, len(columns), twists)
         call(self._ERRORS, self.struct, *given, out, isa=self.isa)
         return out if twists else self.as_written(pose, out, 1)

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray, Int32Array
+from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from pkmcal.core.chains import AnyMachine, ChainMachine
 from pkmcal.core.core_machine import CoreMachine, Found, known_rows, whole_turn, written
 from pkmcal.core.drive_turns import agreed_turns
@@ -77,6 +77,12 @@ class DrivenMachine(CoreMachine):
     def tensioned(self, tension: FloatArray) -> DrivenMachine:
         """The same with tensions of what actuators drive, (n,) or (N, n)."""
         return self._with(tension=tension)
+
+    def of_rows(self, rows: IntArray) -> DrivenMachine:
+        """The same with the state of some rows of a call."""
+        state = {"approach": self.approach, "tension": self.tension}
+        batches = {name: each for name, each in state.items() if each is not None and each.ndim > 1}
+        return self._with(**{name: each[rows] for name, each in batches.items()})
 
     def _with(self, **changed: object) -> DrivenMachine:
         other = copy(self)
@@ -369,6 +375,23 @@ class DrivenMachine(CoreMachine):
         way, state = self._of_limbs.inverse(self._bare(slots), pose), self._state(len(pose))
         slope = self.laws.ways(slots, self.laws.readings(slots, way, *state), *state).slope
         return -self.laws.by_tension(slots, way, state[1]) / slope
+
+    def work_at_anchors(
+        self, slots: FloatArray, q: FloatArray, force: FloatArray, columns: Int32Array
+    ) -> FloatArray:
+        """Work of forces on anchors, as `pkmcal.core.machine.Machine.work_at_anchors`."""
+        own, of_laws, drive = self._sorted(columns)
+        within = [self._within(int(columns[i])) for i in own]
+        ways = [self._offsets[d] for d in drive]  # the way within is there the offset
+        asked = np.array(within + ways, dtype=np.int32)
+        work = self._of_limbs.work_at_anchors(
+            self._bare(slots), self.drives(slots, q), force, asked
+        )
+        out = np.empty((len(q), len(columns)))
+        out[:, own] = work[:, : len(own)]
+        if of_laws:
+            out[:, of_laws] = work[:, len(own) :] * self._by_number(slots, q, columns[of_laws])
+        return out
 
     def moved(self, pose: FloatArray, step: FloatArray) -> FloatArray:
         """Poses moved, as `pkmcal.core.machine.Machine.moved`."""

@@ -47,7 +47,10 @@ STATUS = {
     lib.PKM_INFEASIBLE: "infeasible",
     lib.PKM_INVALID: "invalid input",
     lib.PKM_NOT_CLOSED: "does not close",
+    lib.PKM_GIVES_WAY: "gives way",
 }
+NOT_CONVERGED: int = lib.PKM_NOT_CONVERGED
+GIVES_WAY: int = lib.PKM_GIVES_WAY
 ROWS_PER_THREAD = 10_000  # fewer do not pay for a thread
 MOST_THREADS = 256  # whatever is asked for
 PARTS_PER_THREAD = 4  # one that another program keeps waiting leaves parts to the others

@@ -9,7 +9,7 @@ import numpy as np
 from pkmcal._core import ffi, lib
 from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from pkmcal.core import balance
-from pkmcal.core.core_machine import CoreMachine, whole_turn
+from pkmcal.core.core_machine import CoreMachine, Found, whole_turn
 from pkmcal.core.library import (
     AXES,
     DRIVERS,
@@ -19,7 +19,10 @@ from pkmcal.core.library import (
     SLOTS,
     call,
     ensure,
+    in_threads,
+    part,
     pointer,
+    rows,
 )
 from pkmcal.core.path_differences import platform_motion
 from pkmcal.core.poses import rates_of_twists
@@ -55,6 +58,32 @@ class Closure(NamedTuple):
     by_q: FloatArray
     pose: FloatArray
     pose_by_free: FloatArray
+
+
+class Yielding(NamedTuple):
+    """What yields of a machine, and what pulls at its platform, for `Machine.forward_loaded`.
+
+    Attributes
+    ----------
+    columns : ndarray of int (s,)
+        Places of the numbers that yield in the flattened geometry, rising.
+    compliance : ndarray (s,) or (N, s)
+        mm/N, rad/(N mm).
+    pull : ndarray (16,) or (N, 16)
+        Σ m r [kg mm], Σ m [kg], gravity [N/kg], a point [mm], the force there [N], a moment
+        [N mm]: points in the platform's axes, the rest in the base's.
+    settled, most : ndarray (s,)
+        By how much a number that rests changes at most, and how far one may give.
+    steps : int
+        At most.
+    """
+
+    columns: Int32Array
+    compliance: FloatArray
+    pull: FloatArray
+    settled: FloatArray
+    most: FloatArray
+    steps: int
 
 
 class Machine(CoreMachine):
@@ -211,6 +240,41 @@ class Machine(CoreMachine):
         given = (shape[1], slots, shape[0], q, guess, pose, status, iterations, residual)
         call("forward_machines", self.struct, *given, isa=self.isa)
         return pose
+
+    def forward_loaded(
+        self,
+        slots: FloatArray,
+        q: FloatArray,
+        guess: FloatArray,
+        yielding: Yielding,
+        threads: int | None,
+        out: Found,
+    ) -> None:
+        """`forward` of a machine with as many rows as free coordinates in which numbers yield.
+
+        Rows whose numbers do not come to rest by steps of this kind are "not converged", and
+        their poses mean nothing.
+        """
+        n, found = len(q), out
+        guess_stride = 6 if guess.ndim == 2 else 0
+        places = yielding.columns, len(yielding.columns)
+        of_rows = [
+            (each, each.shape[1] if each.ndim == 2 else 0)
+            for each in (yielding.compliance, yielding.pull)
+        ]
+        ends = yielding.settled, yielding.most, yielding.steps
+
+        def run(start: int, stop: int) -> None:
+            begin = part(guess, start, stop) if guess_stride else guess
+            each = [
+                (part(array, start, stop) if stride else array, stride) for array, stride in of_rows
+            ]
+            given = (stop - start, slots, part(q, start, stop), begin, guess_stride)
+            written = [part(array, start, stop) for array in found]
+            arguments = (*given, *places, *each[0], *each[1], *ends, *written)
+            call("forward_loaded", self.struct, *arguments, isa=self.isa)
+
+        in_threads(run, n, threads)
 
     def forward_jacobian(
         self, slots: FloatArray, pose: FloatArray, q: FloatArray, twists: bool = False
@@ -398,6 +462,27 @@ class Machine(CoreMachine):
         Cables pull the other way. Of a limb between two points the unit vector along it.
         """
         return self.limbs(slots, pose)[1]
+
+    def work_at_anchors(
+        self, slots: FloatArray, q: FloatArray, force: FloatArray, columns: Int32Array
+    ) -> FloatArray:
+        """Work of forces (N, limbs, 3) on the anchors by numbers at `columns`, (N, columns)."""
+        out = np.zeros((len(q), len(columns)))
+        limb, slot = np.divmod(columns, len(SLOTS))
+        for i in np.unique(limb).tolist():
+            mine, pull = limb == i, np.ascontiguousarray(force[:, i])
+            driver = DRIVERS[self.struct.driver[i]]
+            if driver == "length":  # its anchor is its base point
+                by_number = np.zeros((len(q), len(SLOTS)))
+                by_number[:, :3] = pull
+            else:
+                place = 9 * len(AXES) * i
+                frame = np.array(list(self.struct.frame[place : place + 9]))
+                at = np.ascontiguousarray(q[:, self.struct.actuator[i], None])
+                given = (at, np.ascontiguousarray(slots[..., i, :]), pull, frame)
+                _, by_number = rows(f"{driver}_work", *given, isa=self.isa)
+            out[:, mine] = by_number[:, slot[mine]]
+        return out
 
     def closure_cost(self, slots: FloatArray, pose: FloatArray, q: FloatArray) -> FloatArray:
         """Sum of the squared closures over poses (M, 6) and coordinates (M, n), mm².

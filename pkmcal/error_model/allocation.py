@@ -22,7 +22,7 @@ from pkmcal.error_model import shares
 from pkmcal.error_model.monte_carlo import QUANTITIES, Draw, farthest
 from pkmcal.error_model.tolerance import Tolerance, tolerance
 from pkmcal.exceptions import ArgumentError
-from pkmcal.geometry.load import is_of_load
+from pkmcal.geometry.elastic import is_kinematic
 from pkmcal.kinematics.perturbed import Ideal, ideal
 from pkmcal.kinematics.robot import Robot, require_parallel
 from pkmcal.result import Result
@@ -327,7 +327,7 @@ def _groups(robot: Robot, joints: str | Sequence[str] | None) -> dict[str, list[
         lengths = [
             name
             for name, unit, tied in zip(geometry.names, geometry.units, geometry.tied, strict=True)
-            if unit == "mm" and not tied and not is_of_load(name)
+            if unit == "mm" and not tied and is_kinematic(name)
         ]
         if not lengths:
             raise ArgumentError(

@@ -15,12 +15,13 @@ from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.core.library import POSE
 from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError
-from pkmcal.geometry.load import is_of_load
+from pkmcal.geometry.elastic import is_kinematic
 from pkmcal.kinematics.perturbed import ideal, off
 from pkmcal.kinematics.robot import Robot, require_parallel
 from pkmcal.result import Result
 
-# What a step of 1 is: 1 mm, 1 mrad, a ratio's 0.001, and by as much over a metre or a radian.
+# What a step of 1 is: 1 mm, 1 mrad, a ratio's 0.001, and by as much over a metre or a radian; 1 N,
+# 1 kg, and what gives 1 µm or 1 nrad more by 1 N, or 1 N mm.
 PER_STEP = {
     "mm": 1.0,
     "rad": 1e-3,
@@ -30,6 +31,11 @@ PER_STEP = {
     "1/mm2": 1e-9,
     "1/N": 1e-6,
     "N": 1.0,
+    "N mm": 1.0,
+    "N/mm": 1.0,
+    "mm/N": 1e-3,
+    "rad/(N mm)": 1e-9,
+    "kg": 1.0,
 }
 Study = Literal["limb1", "offsets", "all-limbs"]
 STUDIES: tuple[Study, ...] = get_args(Study)
@@ -201,7 +207,7 @@ def own_names(robot: Robot) -> list[str]:
     """List every number that can be replaced and that poses follow, parameters too."""
     geometry = robot.geometry
     names = zip(geometry.names, geometry.tied, strict=True)
-    return [name for name, tied in names if not tied and not is_of_load(name)]
+    return [name for name, tied in names if not tied and is_kinematic(name)]
 
 
 def study_cases(robot: Robot, study: Study) -> list[str]:

@@ -17,7 +17,7 @@ from pkmcal.core.statistics import pose_errors
 from pkmcal.display import Table
 from pkmcal.error_model.monte_carlo import Draw, Progress, simulate
 from pkmcal.exceptions import ArgumentError
-from pkmcal.geometry.load import is_of_load
+from pkmcal.geometry.elastic import is_kinematic
 from pkmcal.kinematics.perturbed import Geometries, Ideal, forward_of, ideal
 from pkmcal.kinematics.robot import Robot, require_parallel
 from pkmcal.result import Result
@@ -318,8 +318,8 @@ def sigma_of(robot: Robot, sigma: Sigma) -> tuple[IntArray, FloatArray]:
                 )
             found[matched] = _deviations(f"sigma of {pattern}", given, ())
     elif as_numbers("sigma", sigma, len(geometry)).ndim == 0:
-        of_load = np.array([is_of_load(name) for name in geometry.names])
-        lengths = ~geometry.tied & (units == "mm") & ~of_load
+        kinematic = np.array([is_kinematic(name) for name in geometry.names])
+        lengths = ~geometry.tied & (units == "mm") & kinematic
         if not lengths.any():
             raise ArgumentError(
                 f"sigma: one number is for lengths, and {robot.name} has none of its own; name"

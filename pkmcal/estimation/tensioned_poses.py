@@ -19,7 +19,7 @@ from pkmcal.estimation.closures import FreePoses, machine_of, one_mm
 from pkmcal.estimation.row_states import RowStates
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.limb_kinds import KINDS
-from pkmcal.geometry.load import CELL, Load
+from pkmcal.geometry.load import CELL, CableLoad
 from pkmcal.kinematics import pose_steps
 from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.kinematics.equilibrium import Equilibrium, balance, equilibrium
@@ -153,7 +153,9 @@ class TensionedPoses(FreePoses):
     def _step_twists(self, robot: Calibratable, states: RowStates) -> FloatArray:
         return np.pad(super()._step_twists(robot, states), ((0, 0), (0, 0), (0, self.cells)))
 
-    def _at(self, robot: Calibratable, states: RowStates) -> tuple[Robot, Load | None, FloatArray]:
+    def _at(
+        self, robot: Calibratable, states: RowStates
+    ) -> tuple[Robot, CableLoad | None, FloatArray]:
         """The machine under the tensions of the states."""
         machine, tension = machine_of(robot), np.asarray(states.tension)
         known = np.isfinite(tension).all(axis=1)
@@ -173,10 +175,12 @@ class TensionedPoses(FreePoses):
             tension = tension + np.where(known[:, None], undone, np.nan)
         return self._said(replace(states, tension=tension), states.pose)
 
-    def _gains(self, load: Load | None) -> FloatArray:
+    def _gains(self, load: CableLoad | None) -> FloatArray:
         return np.ones(self.cells) if load is None else np.array(load.cells)
 
-    def _left(self, machine: Robot, states: RowStates, load: Load, places: IntArray) -> Equilibrium:
+    def _left(
+        self, machine: Robot, states: RowStates, load: CableLoad, places: IntArray
+    ) -> Equilibrium:
         pulled = np.asarray(states.tension) @ self._drives.T
         return equilibrium(machine, states.pose, pulled, load, places)
 

@@ -35,9 +35,7 @@ class Units:
             "1/mm": 1.0 / self.length,
             "1/rad": 1.0 / self.angle,
             "1/mm2": 1.0 / self.length**2,
-            "1/N": 1.0,
-            "N": 1.0,
-        }[unit]
+        }.get(unit, 1.0)  # forces, masses and what yields have their units whatever the file's
 
 
 def shown(value: object) -> str:

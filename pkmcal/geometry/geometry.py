@@ -6,7 +6,8 @@ follows from named parameters (``radius``); it can be read but not replaced.
 
 from __future__ import annotations
 
-from collections.abc import ItemsView, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, ItemsView, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from fnmatch import fnmatchcase
 from functools import cached_property
 from typing import Any, TypeVar
@@ -185,6 +186,11 @@ class Geometry:
         """Places of the limb numbers in the flattened `slots`, (k,)."""
         return self._layout.slot_index
 
+    @property
+    def blank(self) -> FloatArray:
+        """What the core takes where no number is, (n_limbs, columns)."""
+        return self._layout.blank
+
     @cached_property
     def chain(self) -> FloatArray:
         """Derivative of each limb number to each name that can be replaced, (k, p)."""
@@ -287,6 +293,23 @@ class Geometry:
             if wrong.any():
                 self.require_own(self.names[int(np.flatnonzero(wrong)[0])])
         return changed
+
+    def without(self, dropped: Callable[[str], bool]) -> Geometry:
+        """The geometry without the last numbers of the core, those with a name that is `dropped`.
+
+        Parameters that no other number follows go with them.
+        """
+        width = self.slots.shape[1] - sum(dropped(each.name) for each in self.numbers)
+        kept = []
+        for each, place in zip(self.numbers, self.slot_index.tolist(), strict=True):
+            row, column = divmod(place, self.slots.shape[1])
+            if not dropped(each.name):
+                kept.append(replace(each, place=row * width + column))
+        used = {name for each in kept if each.tie is not None for name in each.tie.drivers}
+        drivers = {name for n in self.numbers if n.tie is not None for name in n.tie.drivers}
+        units = dict(zip(self.names, self.units, strict=True))
+        parameters = {n: units[n] for n in self.parameters if n in used or n not in drivers}
+        return Geometry(kept, parameters, dict(self.items()), self.blank[:, :width].copy())
 
     def _at(self, name: str) -> int:
         try:

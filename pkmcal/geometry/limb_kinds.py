@@ -120,6 +120,8 @@ class LimbKind:
             + (("couple",) if self.couple else ())
             + (("weights",) if self.rows or self.couple else ())
             + ("drive", "stroke", "base_cone", "platform_cone")
+            + (() if self.cable else ("stiffness", "mass"))
+            + (("rod_stiffness", "anchor_mass") if self.has_branch else ())
         )
 
     def numbers(self, limb: int | Literal[""], couple: bool) -> tuple[tuple[str, str, Unit], ...]:

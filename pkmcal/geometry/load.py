@@ -15,7 +15,7 @@ Vector = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
-class Load:
+class CableLoad:
     """A force on the platform, and the tensions that its cables may have.
 
     Attributes
@@ -58,7 +58,7 @@ class Load:
         values = (*self.force, *self.at, *self.cells)
         return dict(zip(self.units, values, strict=False))
 
-    def with_numbers(self, numbers: Mapping[str, float]) -> Load:
+    def with_numbers(self, numbers: Mapping[str, float]) -> CableLoad:
         """The same with the numbers of a geometry."""
         if not self.balance:
             return self
@@ -71,7 +71,7 @@ def is_of_load(name: str) -> bool:
     return name.startswith("load.")
 
 
-def read_load(table: Table, actuators: int) -> Load:
+def read_load(table: Table, actuators: int) -> CableLoad:
     """The load of a table ``[load]``, of a robot with so many actuators."""
     table.only(("force", "at", "least", "most", "balance", "cells"))
     balance = table.data.get("balance", False)
@@ -79,7 +79,7 @@ def read_load(table: Table, actuators: int) -> Load:
         table.fail("balance", f"must be true or false, found {shown(balance)}")
     if "cells" in table and not balance:
         table.fail("cells", "are gains of load cells of a load with balance = true")
-    found = Load(
+    found = CableLoad(
         _vector(table, "force", "1"),
         _vector(table, "at", "mm"),
         table.number("least", "1", 0.0),
@@ -112,7 +112,7 @@ def _cells(table: Table, actuators: int) -> tuple[float, ...]:
     return tuple(table.as_number("cells", value, "1") for value in each)
 
 
-def load_table(load: Load) -> dict[str, object]:
+def load_table(load: CableLoad) -> dict[str, object]:
     """The table that `read_load` reads, in mm and N."""
     table: dict[str, object] = {
         "force": list(load.force),

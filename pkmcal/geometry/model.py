@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -16,10 +16,11 @@ from pkmcal.display import Table, fixed
 from pkmcal.geometry.box import Box
 from pkmcal.geometry.chains import Chains
 from pkmcal.geometry.controller import Controller
+from pkmcal.geometry.elastic import Elastic, is_elastic
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.laws import Law, drive
 from pkmcal.geometry.limb_kinds import KINDS
-from pkmcal.geometry.load import Load
+from pkmcal.geometry.load import CableLoad
 
 CHAIN = "chain"  # the kind of a limb that is a chain of joints: see `pkmcal.geometry.chains`
 
@@ -153,13 +154,15 @@ class Model:
     workspace : mapping of str to (float, float)
         Least and largest value of coordinates of the pose, mm and rad: where the machine may go,
         a bed or a frame being in the way. Empty where the file states none.
-    load : Load or None
+    load : CableLoad or None
         What acts on the platform, of a machine on cables whose file states it.
     probe : ndarray (3,) or None
         Offset of the bed probe of a printer's firmware, mm: it touches at the nozzle's x and y
         plus the first two, and the nozzle is then the third above the bed. None: not stated.
     controller : Controller or None
         The firmware from which the numbers were imported.
+    elastic : Elastic or None
+        What yields and what pulls at it; None of a rigid machine.
     """
 
     name: str
@@ -176,9 +179,10 @@ class Model:
     file: str | None = None
     chains: Chains | None = None
     workspace: Box = field(default_factory=dict)
-    load: Load | None = None
+    load: CableLoad | None = None
     probe: FloatArray | None = None
     controller: Controller | None = None
+    elastic: Elastic | None = None
 
     def __post_init__(self) -> None:
         if self.load is not None:  # some of its numbers may be those of the geometry
@@ -192,7 +196,16 @@ class Model:
         return other
 
     @property
-    def balanced_load(self) -> Load | None:
+    def rigid(self) -> Model:
+        """The same without what yields and what pulls."""
+        if self.elastic is None:
+            return self
+        free = tuple(name for name in self.free if not is_elastic(name))
+        geometry = self.geometry.without(is_elastic)
+        return replace(self, geometry=geometry, free=free, elastic=None)
+
+    @property
+    def balanced_load(self) -> CableLoad | None:
         """The load that tensions of a calibration's rows balance; None: they need not."""
         return self.load if self.load is not None and self.load.balance else None
 

@@ -24,10 +24,12 @@ from pkmcal.geometry.box import read_box
 from pkmcal.geometry.controller import read_controller
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.limb_kinds import KINDS
-from pkmcal.geometry.load import Load, read_load
+from pkmcal.geometry.load import CableLoad, read_load
 from pkmcal.geometry.model import CHAIN, Limb, Model
 from pkmcal.geometry.probe_offset import read_probe
 from pkmcal.geometry.robot_file_chains import chain_limbs, read_chains
+from pkmcal.geometry.robot_file_elastic import TOP as TOP_ELASTIC
+from pkmcal.geometry.robot_file_elastic import read_elastic
 from pkmcal.geometry.robot_file_laws import refuse_turning
 from pkmcal.geometry.robot_file_limbs import Limbs, Parameters, read_limbs
 from pkmcal.geometry.robot_file_writer import text_of
@@ -38,7 +40,7 @@ STATED_SIZES = ("base_radius", "base_diameter", "platform_radius", "platform_dia
 INDEPENDENT = "independent"  # the default free set of a file that names none: found when loaded
 TOP = (
     "name", "units", "closure_tolerance", "frames", "pose", "workspace", "load", "probe",
-    "controller", "parameters", "calibration", "stated", "limb", "tail",
+    "controller", "parameters", "calibration", "stated", "limb", "tail", *TOP_ELASTIC,
 )  # fmt: skip
 
 
@@ -160,6 +162,7 @@ def parse(source: Source, file: str | None) -> Model:
     else:
         limbs = read_limbs(described, parameters)
         _check_rows(pose, pose_map, limbs.limbs)
+    elastic, limbs = read_elastic(top, described, limbs, parameters)
     values = parameters.finish([number.name for number in limbs.numbers])
     units = parameters.ordered_units()
     load = _read_load(top, limbs.limbs)
@@ -185,6 +188,7 @@ def parse(source: Source, file: str | None) -> Model:
         load=load,
         probe=read_probe(top.table("probe")) if "probe" in top else None,
         controller=read_controller(top.table("controller")) if "controller" in top else None,
+        elastic=elastic,
         file=file,
     )
     refuse_turning(model, described)
@@ -200,7 +204,7 @@ def _read_tolerance(top: Table) -> float | None:
     return found
 
 
-def _read_load(top: Table, limbs: tuple[Limb, ...]) -> Load | None:
+def _read_load(top: Table, limbs: tuple[Limb, ...]) -> CableLoad | None:
     if "load" not in top:
         return None
     if not any(limb.kind in KINDS and KINDS[limb.kind].cable for limb in limbs):

@@ -31,6 +31,11 @@ UNIT_WORDS: dict[Unit, str] = {
     "1/mm2": "per square of length",
     "1/N": "per force",
     "N": "a force",
+    "N mm": "a moment",
+    "N/mm": "a stiffness",
+    "mm/N": "a compliance",
+    "rad/(N mm)": "a compliance of an angle",
+    "kg": "a mass",
 }
 
 

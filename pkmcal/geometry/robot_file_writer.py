@@ -14,8 +14,9 @@ from pkmcal.geometry.load import is_of_load, load_table
 from pkmcal.geometry.model import Cone, Limb, Model
 from pkmcal.geometry.probe_offset import probe_table
 from pkmcal.geometry.robot_file_chain_writer import chain_tables, tail_tables
+from pkmcal.geometry.robot_file_elastic_writer import elastic_tables, limb_masses
 from pkmcal.geometry.robot_file_laws import law_table
-from pkmcal.geometry.ties import LimbNumber, Term
+from pkmcal.geometry.ties import LimbNumber
 
 HEADER = "# A robot for pkmcal: lengths in mm, angles in rad.\n"
 
@@ -25,16 +26,24 @@ def text_of(model: Model) -> str:
     head: dict[str, Any] = {"name": model.name, "units": {"length": "mm", "angle": "rad"}}
     if model.closure_tolerance is not None:
         head["closure_tolerance"] = model.closure_tolerance
+    of_elastic, tables, balancers = elastic_tables(model.elastic, model.geometry)
+    head |= of_elastic
     blocks = [HEADER, lines(head)]
-    blocks += [f"[{key}]\n{lines(table)}" for key, table in _sections(model).items() if table]
+    blocks += [
+        f"[{key}]\n{lines(table)}" for key, table in (_sections(model) | tables).items() if table
+    ]
     tail: list[dict[str, Any]] = []
     if model.chains is not None:
         limbs = list(chain_tables(model.chains, model.geometry))
         tail = list(tail_tables(model.chains, model.geometry))
     else:
         limbs = [_limb(limb, i, model.geometry) for i, limb in enumerate(model.limbs)]
+        if model.elastic is not None:
+            for i, limb in enumerate(limbs):
+                limb |= limb_masses(model.elastic, model.geometry, i)
     blocks += [f"[[limb]]\n{lines(limb)}" for limb in limbs]
     blocks += [f"[[tail]]\n{lines(joint)}" for joint in tail]
+    blocks += [f"[[balancer]]\n{lines(balancer)}" for balancer in balancers]
     return "\n".join(blocks)
 
 
@@ -95,7 +104,7 @@ def _limb(limb: Limb, i: int, geometry: Geometry) -> dict[str, Any]:
 
     def entry(slot: str) -> float | str:
         tie = numbers[slot].tie
-        return geometry[numbers[slot].name] if tie is None else _term(tie.terms[0])
+        return geometry[numbers[slot].name] if tie is None else tie.terms[0].written
 
     data: dict[str, Any] = {
         "kind": limb.kind,
@@ -135,18 +144,12 @@ def _point(
     point: str, numbers: Mapping[str, LimbNumber], geometry: Geometry
 ) -> list[float | str] | dict[str, float | str]:
     xyz = [numbers[f"{point}.{axis}"] for axis in "xyz"]
-    entries = [geometry[n.name] if n.tie is None else _term(n.tie.terms[0]) for n in xyz]
+    entries = [geometry[n.name] if n.tie is None else n.tie.terms[0].written for n in xyz]
     tie = xyz[0].tie
     if tie is None or tie.rule == "equal":
         return entries
     radius, angle = tie.terms
-    return {"radius": _term(radius), "angle": _term(angle), "z": entries[2]}
-
-
-def _term(term: Term) -> float | str:
-    if term.name is None:
-        return term.factor
-    return term.name if term.factor > 0.0 else f"-{term.name}"
+    return {"radius": radius.written, "angle": angle.written, "z": entries[2]}
 
 
 def _cone(cone: Cone) -> dict[str, Any]:

@@ -16,6 +16,13 @@ class Term(NamedTuple):
     factor: float
     name: str | None = None
 
+    @property
+    def written(self) -> float | str:
+        """As a robot file has it."""
+        if self.name is None:
+            return self.factor
+        return self.name if self.factor > 0.0 else f"-{self.name}"
+
 
 class Tie(NamedTuple):
     """How a limb number follows from its terms.

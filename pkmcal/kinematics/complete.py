@@ -13,13 +13,13 @@ import numpy as np
 
 from pkmcal.arguments import did_you_mean, words
 from pkmcal.arrays import BoolArray, FloatArray, wrapped
-from pkmcal.core.driven import CompiledMachine
 from pkmcal.core.library import MAPS, POSE
 from pkmcal.core.machine import Closure
 from pkmcal.core.path_differences import along_path
 from pkmcal.core.poses import rates_of_twists
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.frames import Frames
+from pkmcal.kinematics.loaded import AnyCompiled
 from pkmcal.screw import from_pose
 
 ITERATIONS = 30
@@ -90,7 +90,7 @@ class Completed(NamedTuple):
 
 
 def complete(
-    machine: CompiledMachine,
+    machine: AnyCompiled,
     map: str,
     slots: FloatArray,
     frames: Frames,
@@ -153,7 +153,7 @@ def complete(
         rows = np.flatnonzero(live & ~done)
         if not rows.size:
             break
-        closure = machine.closure(slots, own[rows], q[rows])
+        closure = machine.of_rows(rows).closure(slots, own[rows], q[rows])
         own[rows[:, None], fixed] = closure.pose[:, fixed]
         seen = _seen(frames, own[rows], matched, wanted[rows])
         left = _system(closure, frames, own[rows], seen, free, matched)
@@ -188,7 +188,7 @@ def complete(
 
 
 def in_working_mode(
-    machine: CompiledMachine, slots: FloatArray, own: FloatArray, q: FloatArray
+    machine: AnyCompiled, slots: FloatArray, own: FloatArray, q: FloatArray
 ) -> BoolArray:
     """Whether limbs at actuators (N, n) are in the working mode in which the inverse has them."""
     way, there = (machine.drives(slots, each) for each in (q, machine.inverse(slots, own, q)))
@@ -199,7 +199,7 @@ def in_working_mode(
 
 
 def _to_map(
-    machine: CompiledMachine,
+    machine: AnyCompiled,
     slots: FloatArray,
     frames: Frames,
     own: FloatArray,
@@ -308,7 +308,7 @@ def _kept_by_free(
 
 
 def completed_rates(
-    machine: CompiledMachine,
+    machine: AnyCompiled,
     map: str,
     slots: FloatArray,
     frames: Frames,
@@ -366,7 +366,7 @@ def _acceleration(motion: FloatArray, pose: FloatArray) -> FloatArray:
 
 
 def _correct_actuators(
-    machine: CompiledMachine,
+    machine: AnyCompiled,
     slots: FloatArray,
     frames: Frames,
     own: FloatArray,
@@ -396,7 +396,7 @@ def _correct_actuators(
 
 
 def _forward(
-    machine: CompiledMachine,
+    machine: AnyCompiled,
     slots: FloatArray,
     frames: Frames,
     own: FloatArray,

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from pkmcal.arrays import FloatArray, IntArray, mm_per_unit
 from pkmcal.core import instruments
-from pkmcal.geometry.load import AT, FORCE, Load
+from pkmcal.geometry.load import AT, FORCE, CableLoad
 from pkmcal.kinematics import pose_steps
 from pkmcal.kinematics.robot import Robot
 from pkmcal.screw import from_pose
@@ -49,13 +49,13 @@ class Equilibrium:
 
 
 def equilibrium(
-    robot: Robot, pose: FloatArray, tension: FloatArray, load: Load, places: IntArray
+    robot: Robot, pose: FloatArray, tension: FloatArray, load: CableLoad, places: IntArray
 ) -> Equilibrium:
     """What is left of forces at poses (N, 6) under tensions (N, c) of cables, a limb each.
 
     `places` (p,) are those of numbers in ``robot.geometry.names``.
     """
-    machine, arcs = robot.limb_machine, _arcs(robot)
+    machine, arcs = robot.cable_machine, _arcs(robot)
     columns, chain = robot.geometry.driven(places)
     own, m = np.ascontiguousarray(robot.frames.inward(pose)), len(arcs)
     h = _STEP * float(machine.struct.size)
@@ -80,10 +80,10 @@ def equilibrium(
     )
 
 
-def balance(robot: Robot, pose: FloatArray, load: Load) -> tuple[FloatArray, FloatArray]:
+def balance(robot: Robot, pose: FloatArray, load: CableLoad) -> tuple[FloatArray, FloatArray]:
     """What tensions of 1 pull at poses (N, m, c), and what the cables should pull (N, m)."""
     own, arcs = np.ascontiguousarray(robot.frames.inward(pose)), _arcs(robot)
-    ways = robot.limb_machine.ways_at(robot.slots, own, np.empty(0, dtype=np.int32))[0]
+    ways = robot.cable_machine.ways_at(robot.slots, own, np.empty(0, dtype=np.int32))[0]
     return (ways / arcs).transpose(0, 2, 1), pulls_of_load(robot, own, load.force, load.at)
 
 
@@ -115,12 +115,12 @@ def generalised(robot: Robot, own: FloatArray, pull: FloatArray, point: FloatArr
     """Generalised forces (N, m) of forces (N, 3) at points (N, 3): torques over the length."""
     arcs = _arcs(robot)
     wrench = np.concatenate([np.cross(point - own[:, :3], pull), pull], axis=1)
-    twists = robot.limb_machine.step_twists(own)
+    twists = robot.cable_machine.step_twists(own)
     forces: FloatArray = (twists.transpose(0, 2, 1) @ wrench[:, :, None])[:, :, 0] / arcs
     return forces
 
 
-def _by_load(robot: Robot, own: FloatArray, load: Load) -> dict[str, FloatArray]:
+def _by_load(robot: Robot, own: FloatArray, load: CableLoad) -> dict[str, FloatArray]:
     """Derivative (N, m) of the generalised forces, which are linear in each, by its numbers."""
     here = pulls_of_load(robot, own, load.force, load.at)
     found = {}

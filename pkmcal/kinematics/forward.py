@@ -43,8 +43,9 @@ class Forward(RowResult):
         x y z in mm, α β γ in rad; NaN where `status` is not 0.
     status : ndarray of int (...)
         0 ok, 1 not converged, 2 singular, 3 infeasible, 4 invalid input, 5 does not close: of more
-        closures than free coordinates one misses by more than ``robot.closure_tolerance``. `ok`
-        and `failed` are masks of it, `failures` says it in words.
+        closures than free coordinates one misses by more than ``robot.closure_tolerance``, 6 gives
+        way: under its load the machine does not hold. `ok` and `failed` are masks of it,
+        `failures` says it in words.
     iterations : ndarray of int (...)
         Newton steps taken.
     residual : ndarray (...)

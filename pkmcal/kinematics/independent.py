@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pkmcal.arrays import FloatArray, first_largest
+from pkmcal.geometry.elastic import is_kinematic
 from pkmcal.kinematics.robot import Robot
 
 INDEPENDENT = 1e-7  # least part of a number's effect that the others cannot have
@@ -43,7 +44,7 @@ def independent_numbers(robot: Robot) -> tuple[str, ...]:
         [
             i
             for i, (name, tied) in enumerate(zip(geometry.names, geometry.tied, strict=True))
-            if not tied and not name.startswith(_KNOWN)
+            if not tied and not name.startswith(_KNOWN) and is_kinematic(name)
         ]
     )
     effects = near_home(robot)[:, :, places]

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal.arguments import instance
 from pkmcal.arrays import BoolArray, FloatArray, Unit, as_numbers, as_rows, mm_per_unit
-from pkmcal.core.chains import ChainMachine
+from pkmcal.core.chains import AnyMachine, ChainMachine
 from pkmcal.core.core_machine import written
 from pkmcal.core.driven import DrivenMachine
 from pkmcal.core.library import MAPS, POSE
 from pkmcal.core.machine import Machine
 from pkmcal.core.pulleys import PulleyMachine
 from pkmcal.exceptions import ArgumentError
+from pkmcal.geometry.carried import Load
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.model import CHAIN, Model
 from pkmcal.kinematics.complete import (
@@ -28,11 +31,13 @@ from pkmcal.kinematics.complete import (
 from pkmcal.kinematics.forward import Forward
 from pkmcal.kinematics.frames import Frames
 from pkmcal.kinematics.limits import kept, margin_of
+from pkmcal.kinematics.loaded import LoadedMachine
 from pkmcal.kinematics.machines import machine_of
 from pkmcal.kinematics.reused import reused_forward, reused_rows
 from pkmcal.modes.find import AssemblyProblem
 from pkmcal.screw import to_pose
 
+K = TypeVar("K", bound="Kinematics")
 Match = bool | str | Sequence[str] | None
 
 _NONE = 1e-6  # of the largest: a singular value that is none
@@ -71,7 +76,7 @@ class Kinematics:
             kept_array.setflags(write=False)
 
     @property
-    def limb_machine(self) -> Machine | DrivenMachine:
+    def limb_machine(self) -> Machine | DrivenMachine | LoadedMachine:
         """The compiled machine of limbs in closed form.
 
         Raises
@@ -82,6 +87,13 @@ class Kinematics:
         if self.model.chains is not None or isinstance(self.machine, ChainMachine):
             raise ArgumentError(f"robot: {self.model.name} has limbs that are chains of joints")
         return self.machine
+
+    @property
+    def cable_machine(self) -> Machine | DrivenMachine:
+        """The compiled machine of limbs in closed form, of which cables do not yield."""
+        machine = self.limb_machine
+        assert not isinstance(machine, LoadedMachine)
+        return machine
 
     @property
     def home(self) -> FloatArray:
@@ -172,6 +184,7 @@ class Kinematics:
         *,
         near: ArrayLike | None = None,
         out: FloatArray | None = None,
+        load: Load | None = None,
     ) -> FloatArray:
         """Actuator coordinates of a pose, limb by limb in closed form.
 
@@ -194,6 +207,8 @@ class Kinematics:
         out : ndarray (..., n), optional
             float64, contiguous: written to and returned, in place of a new array. A result of
             `forward` refers to its coordinates: ask it for conditioning and certificate before.
+        load : Load, optional
+            What a machine that yields carries in place of the payload that its file states.
 
         Returns
         -------
@@ -210,6 +225,8 @@ class Kinematics:
         -----
         Length limbs: eq. 3 of the 2TPR&2TPS paper, ‖p + R b - base‖.
         """
+        if load is not None:
+            return self.under(load).inverse(pose, match, near=near, out=out)
         rows, shape = as_rows("pose", pose, 6)
         about = None if near is None else self._near(near, shape)
         into = None
@@ -220,6 +237,42 @@ class Kinematics:
         else:
             q = written(self._completed(rows, match, about).q, into)
         return q.reshape(*shape, self.n_actuators)
+
+    def under(self: K, load: Load) -> K:
+        """The machine with what it carries in place of the payload that its file states.
+
+        Parameters
+        ----------
+        load : Load
+            One for all rows, or a batch, which goes with calls of as many rows.
+
+        Returns
+        -------
+        Robot
+            What `replace` and `load` make of it knows no such load.
+
+        Raises
+        ------
+        ValueError, TypeError
+            The machine does not yield, so that no load moves it; or no load.
+
+        Examples
+        --------
+        >>> import pkmcal as pk
+        >>> robot = pk.load("hexapod").yielding({"offset*": 1e-4})
+        >>> carrying = robot.under(pk.Load(mass=100))
+        >>> sag = carrying.forward(robot.rigid.inverse(robot.home)).pose - robot.home
+        >>> sag[:3].round(4) + 0.0
+        array([ 0.    ,  0.    , -0.0175])
+        """
+        instance("load", load, Load)
+        if not isinstance(self.machine, LoadedMachine):
+            raise ArgumentError(
+                f"load: nothing of {self.model.name} yields: state stiffness or [compliance]"
+            )
+        other = copy(self)
+        other.machine = self.machine.carrying(load.rows(None))
+        return other
 
     @property
     def turns(self) -> FloatArray:
@@ -269,6 +322,8 @@ class Kinematics:
         guess: ArrayLike | None = None,
         threads: int | None = None,
         out: Forward | None = None,
+        *,
+        load: Load | None = None,
     ) -> Forward:
         """Pose at given actuator coordinates, by Newton's method on the closures (eq. 13).
 
@@ -284,6 +339,8 @@ class Kinematics:
             An earlier result of as many rows. Its arrays are written to, those of what is returned
             are the same; what it said is lost. A result refers to `q` and `guess`, for what is
             computed when asked for.
+        load : Load, optional
+            What a machine that yields carries in place of the payload that its file states.
 
         Returns
         -------
@@ -309,6 +366,8 @@ class Kinematics:
         >>> found.pose.shape
         (10, 6)
         """
+        if load is not None:
+            return self.under(load).forward(q, guess, threads, out)
         rows, shape = as_rows("q", q, self.n_actuators)
         if guess is None:
             start = self.own_home
@@ -437,12 +496,18 @@ class Kinematics:
             start = np.tile(self.home, (len(lost), 1))
             start[:, places] = rows[lost][:, places]
             about = near if near is None or near.ndim == 1 else near[lost]
+            parts = self.machine.of_rows(lost), *parts[1:]
             for each, again in zip(found, complete(*parts, start, places, about), strict=True):
                 each[lost] = again
         return found
 
     def assembly_problem(self, q: FloatArray) -> AssemblyProblem:
         """The closures at coordinates (n,) or (N, n), for certificates and searches for modes."""
+        if isinstance(self.machine, LoadedMachine):
+            raise ArgumentError(
+                f"robot: {self.model.name} yields, and modes and certificates are those of a rigid"
+                " machine: ask its `rigid`"
+            )
         limbs = self.model.limbs
         machine, slots, at = self.machine.bare(self.slots, np.atleast_2d(q))
         return AssemblyProblem(
@@ -474,16 +539,23 @@ class Kinematics:
         Each chain closed for itself, in the posture that is reached from home. Swivels of pulleys
         turn from the direction `zero` of their limb.
         """
-        machine, slots, at = self.machine.bare(self.slots, q)
+        machine, slots, at = self.bare_at(own, q)
         if isinstance(machine, PulleyMachine):
             return machine.swivels(slots, np.ascontiguousarray(own))[0]
         if not isinstance(machine, ChainMachine):
             raise ArgumentError(f"{self.model.name}: its limbs are no chains of joints")
         return machine.frames(slots, np.ascontiguousarray(own), at)[0]
 
+    def bare_at(self, own: FloatArray, q: FloatArray) -> tuple[AnyMachine, FloatArray, FloatArray]:
+        """The machine without drive laws and load, its geometry and coordinates at own poses."""
+        machine, slots = self.machine, self.slots
+        if isinstance(machine, LoadedMachine):
+            slots, machine = machine.under_load(slots, np.ascontiguousarray(own), q), machine.inner
+        return machine.bare(slots, q)
+
     def chain_points(self, own: FloatArray, q: FloatArray) -> list[FloatArray]:
         """Where the joints of each chain are at own poses (N, 6), in own axes: (N, joints, 3)."""
-        machine, slots, at = self.machine.bare(self.slots, q)
+        machine, slots, at = self.bare_at(own, q)
         assert isinstance(machine, ChainMachine) and self.model.chains is not None
         frames = machine.frames(slots, np.ascontiguousarray(own), at)[1]
         found, start = [], 0

@@ -10,10 +10,13 @@ from pkmcal.core.driven import CompiledMachine, DrivenMachine
 from pkmcal.core.library import MAPS, SLOTS
 from pkmcal.core.machine import Machine
 from pkmcal.core.pulleys import PulleyMachine, has_bent
+from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.model import Model
+from pkmcal.kinematics.loaded import AnyCompiled, LoadedMachine
+from pkmcal.kinematics.pulls import Pulls
 
 
-def machine_of(model: Model, slots: FloatArray, length: float) -> CompiledMachine:
+def machine_of(model: Model, slots: FloatArray, length: float) -> AnyCompiled:
     """Make the compiled machine.
 
     Parameters
@@ -25,6 +28,11 @@ def machine_of(model: Model, slots: FloatArray, length: float) -> CompiledMachin
     length : float
         Characteristic length, mm.
     """
+    made = _rigid(model, slots, length)
+    return made if model.elastic is None else _loaded(model, made, slots)
+
+
+def _rigid(model: Model, slots: FloatArray, length: float) -> CompiledMachine:
     inner: AnyMachine
     if model.chains is not None:
         inner = ChainMachine(model.chains.layout, model.closure_tolerance)
@@ -40,8 +48,9 @@ def machine_of(model: Model, slots: FloatArray, length: float) -> CompiledMachin
 def _of_limbs(model: Model, slots: FloatArray, length: float) -> Machine:
     """A machine of limbs; one with drive laws has a drive of its own for each of them."""
     limbs = [limb.for_core() for limb in model.limbs]
+    slots = np.ascontiguousarray(slots[:, : model.own_width])
     if model.driven:
-        slots = np.ascontiguousarray(slots[:, : model.own_width])
+        slots = slots.copy()
         slots[:, [SLOTS.index("offset"), SLOTS.index("gain")]] = 0.0, 1.0
         limbs = [limb | {"actuator": i} for i, limb in enumerate(limbs)]
     if sum(len(limb["weights"]) for limb in limbs) == len(MAPS[model.map]):
@@ -50,3 +59,22 @@ def _of_limbs(model: Model, slots: FloatArray, length: float) -> Machine:
     home = np.ascontiguousarray(model.home, dtype=np.float64)
     made = PulleyMachine if has_bent(limbs) else Machine
     return made(model.map, limbs, length, slots, home, model.closure_tolerance)
+
+
+def _loaded(model: Model, inner: CompiledMachine, slots: FloatArray) -> LoadedMachine:
+    """The machine that yields around the rigid one."""
+    assert model.elastic is not None
+    lead = f"robot: {model.name} has stiffness"
+    if inner.rows != inner.m:
+        raise ArgumentError(
+            f"{lead}, and {inner.rows} closures for {inner.m} coordinates: how forces are shared"
+            " then depends on how it was put together"
+        )
+    chains = model.chains
+    if chains is not None and (chains.layout.shared or chains.layout.loose or chains.tail):
+        raise ArgumentError(f"{lead}, which chains that share joints or carry a tail cannot have")
+    pulls = Pulls(model.elastic, model.base_frame, model.tool_frame)
+    names = list(model.geometry.names)
+    places = [names.index(spring.number) for spring in model.elastic.springs]
+    width = slots.shape[1] - len(model.elastic.units)
+    return LoadedMachine(inner, pulls, model.geometry.slot_index[places], slots.shape, width)

@@ -6,11 +6,11 @@ import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray
 from pkmcal.geometry.limb_kinds import KINDS
-from pkmcal.geometry.load import Load
+from pkmcal.geometry.load import CableLoad
 from pkmcal.kinematics.robot import Robot
 from pkmcal.kinematics.tensions import can_pull
 
-PRELOAD = Load(least=1.0)
+PRELOAD = CableLoad(least=1.0)
 _SOME = 1e-3  # N: with a force of 1 N
 
 
@@ -20,7 +20,7 @@ def on_cables(robot: Robot) -> bool:
     return robot.model.chains is None and all(KINDS[limb.kind].cable for limb in limbs)
 
 
-def load_of(robot: Robot) -> Load | None:
+def load_of(robot: Robot) -> CableLoad | None:
     """The load under which cables have to pull; None without cables, and where nothing is known.
 
     That of the robot file. Where it states none, of machines on cables alone what holds these taut
@@ -35,10 +35,10 @@ def load_of(robot: Robot) -> Load | None:
     return next((load for load in trials if can_pull(robot, robot.home[None], load)[0]), None)
 
 
-def along(axis: str) -> Load:
+def along(axis: str) -> CableLoad:
     """A force of 1 N along an axis, such as "-z"."""
     x, y, z = ((axis[1] == name) * (1.0 if axis[0] == "+" else -1.0) for name in "xyz")
-    return Load(force=(x, y, z), least=_SOME)
+    return CableLoad(force=(x, y, z), least=_SOME)
 
 
 def pulled(robot: Robot, poses: FloatArray) -> BoolArray:

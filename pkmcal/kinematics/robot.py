@@ -17,7 +17,6 @@ from pkmcal import arguments
 from pkmcal.arguments import instance, whole
 from pkmcal.arrays import FloatArray, as_rows, wrapped
 from pkmcal.core.chains import ChainMachine
-from pkmcal.core.driven import CompiledMachine
 from pkmcal.core.library import POSE
 from pkmcal.core.poses import rates_of_twists
 from pkmcal.display import Table
@@ -25,12 +24,15 @@ from pkmcal.exceptions import ArgumentError
 from pkmcal.files.atomic import write_whole
 from pkmcal.files.toml_lines import Source
 from pkmcal.geometry import box, robot_file
+from pkmcal.geometry.carried import Load
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.model import Model
+from pkmcal.geometry.yielding import carrying, yielding
 from pkmcal.kinematics import chain_limits
 from pkmcal.kinematics.complete import completed
 from pkmcal.kinematics.kinematics import Kinematics, Match
 from pkmcal.kinematics.limits import Feasibility, feasibility
+from pkmcal.kinematics.loaded import AnyCompiled
 from pkmcal.modes.assemblies import Assemblies
 from pkmcal.modes.find import assemblies, continue_path, find_modes, nearest_first, pose_distance
 from pkmcal.result import Result
@@ -182,7 +184,7 @@ class Robot(Kinematics, Result):
         """Limits of chains at own poses (N, 6) with coordinates (N, n), by default the inverse."""
         if q is None:
             q = self.machine.inverse(self.slots, own)
-        machine, slots, at = self.machine.bare(self.slots, q)
+        machine, slots, at = self.bare_at(own, q)
         assert isinstance(machine, ChainMachine) and self.model.chains is not None
         return chain_limits.feasibility(self.model.chains, machine, slots, own, at)
 
@@ -496,6 +498,64 @@ class Robot(Kinematics, Result):
         changed.slots = np.ascontiguousarray(changed.model.geometry.slots)
         return changed
 
+    @cached_property
+    def rigid(self) -> Robot:
+        """The machine without what yields and what pulls at it; itself where nothing yields."""
+        return self if self.model.elastic is None else Robot(self.model.rigid)
+
+    def yielding(self, compliance: Mapping[str, float]) -> Robot:
+        """The machine with numbers of its limbs that yield.
+
+        Parameters
+        ----------
+        compliance : mapping of str to float
+            By name or wildcard of numbers, mm/N and rad/(N mm), 0 or more. Numbers that yield
+            already get the new compliance.
+
+        Returns
+        -------
+        Robot
+            Masses, payload and gravity as before; without any, gravity points along -z.
+
+        Raises
+        ------
+        ValueError, TypeError
+            A name that matches no number of a limb, a ratio, which does not yield, or a compliance
+            below 0.
+
+        Examples
+        --------
+        >>> import pkmcal as pk
+        >>> robot = pk.load("hexapod").yielding({"offset*": 5e-5})
+        >>> robot.geometry["compliance.offset1"]
+        5e-05
+        """
+        return Robot(yielding(self.model, compliance))
+
+    def carrying(self, load: Load) -> Robot:
+        """The machine with another payload stated, which `replace` and `save` keep.
+
+        Parameters
+        ----------
+        load : Load
+            One for all rows.
+
+        Raises
+        ------
+        ValueError, TypeError
+            Nothing of the machine yields, so that no load moves it; a load of several rows; a
+            stated payload that follows parameters.
+
+        Examples
+        --------
+        >>> import pkmcal as pk
+        >>> robot = pk.load("hexapod").yielding({"offset*": 5e-5})
+        >>> robot.carrying(pk.Load(mass=5)).geometry["payload.mass"]
+        5.0
+        """
+        self.under(load)  # refuses
+        return Robot(carrying(self.model, load))
+
     def approaching(self, approach: ArrayLike) -> Robot:
         """The robot with actuators that come from a known direction, for laws with backlash.
 
@@ -554,7 +614,7 @@ class Robot(Kinematics, Result):
         return self._with_drives(self.machine.tensioned, rows[0] if shape == () else rows)
 
     def _with_drives(
-        self, changed: Callable[[FloatArray], CompiledMachine], state: FloatArray
+        self, changed: Callable[[FloatArray], AnyCompiled], state: FloatArray
     ) -> Robot:
         """The robot with its drives, where they have laws, in another state."""
         if not self.model.driven:
@@ -564,7 +624,7 @@ class Robot(Kinematics, Result):
         return other
 
     @cached_property
-    def _of_any_misfit(self) -> CompiledMachine:
+    def _of_any_misfit(self) -> AnyCompiled:
         return self.machine.with_tolerance(np.inf)
 
     @property
@@ -609,7 +669,8 @@ class Robot(Kinematics, Result):
         like : str or path, optional
             The file that the robot came from: its units, order, names and comments are kept, and
             only the values that changed are others. Numbers are then read back to 1e-13 of the
-            machine's size, for its units are not mm and rad. A file of chains is written anew.
+            machine's size, for its units are not mm and rad. A file of chains, or with stiffness,
+            is written anew.
         deviations : mapping of str to float, optional
             With `like`: standard deviations by name, mm and rad, as comments.
 
@@ -621,7 +682,7 @@ class Robot(Kinematics, Result):
         """
         for limb, why in self.model.doubts():
             raise ArgumentError(f"robot: limb {limb + 1} of {self.name}: its drive law: {why}")
-        if like is None or self.model.chains is not None:
+        if like is None or self.model.chains is not None or self.model.elastic is not None:
             robot_file.write(self.model, path, comment)
             return
         from pkmcal.geometry.robot_file_kept import text_like

@@ -15,7 +15,7 @@ from pkmcal.core import instruments
 from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.limb_kinds import KINDS
-from pkmcal.geometry.load import Load, Vector
+from pkmcal.geometry.load import CableLoad, Vector
 from pkmcal.kinematics.equilibrium import generalised, pulls_of_load
 from pkmcal.kinematics.robot import Robot, require_parallel
 from pkmcal.result import RowResult
@@ -136,7 +136,7 @@ def tensions(
     return Tensions(found.reshape(*shape, len(cables)), status.reshape(shape))
 
 
-def can_pull(robot: Robot, poses: FloatArray, load: Load) -> BoolArray:
+def can_pull(robot: Robot, poses: FloatArray, load: CableLoad) -> BoolArray:
     """At which poses (N, 6) all cables can pull at once: where `tensions` would be ok.
 
     Without tensions, which take some hundred times as long.
@@ -148,9 +148,9 @@ def can_pull(robot: Robot, poses: FloatArray, load: Load) -> BoolArray:
 
 def _stated(
     robot: Robot, force: ArrayLike | None, at: ArrayLike | None, least: object, most: object
-) -> Load:
+) -> CableLoad:
     """The load of the robot file, with what was given in its place."""
-    load = robot.model.load or Load()
+    load = robot.model.load or CableLoad()
     if force is not None:
         load = replace(load, force=_vector("force", force))
     if at is not None:
@@ -190,9 +190,9 @@ class _Balance(NamedTuple):
         return np.asarray(np.isfinite(self.slopes).all(axis=(1, 2)))
 
 
-def _balance(robot: Robot, poses: FloatArray, load: Load) -> _Balance:
+def _balance(robot: Robot, poses: FloatArray, load: CableLoad) -> _Balance:
     force, at = np.array(load.force), np.array(load.at)
-    machine, slots = robot.limb_machine, robot.slots
+    machine, slots = robot.cable_machine, robot.slots
     own = robot.on_map(robot.frames.inward(poses))
     directions = machine.pulls(slots, own)
     slopes = machine.closure(slots, own, machine.inverse(slots, own)).by_step.transpose(0, 2, 1)

@@ -11,12 +11,12 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray
 from pkmcal.core.core_machine import known_rows
-from pkmcal.core.driven import CompiledMachine
+from pkmcal.kinematics.loaded import AnyCompiled
 
 _TURN = 2.0 * np.pi
 
 
-def unwrapped(machine: CompiledMachine, start: FloatArray, way: FloatArray) -> FloatArray:
+def unwrapped(machine: AnyCompiled, start: FloatArray, way: FloatArray) -> FloatArray:
     """Ways q̃ (k, drives) in their order along a move, angles continuous from those at its start.
 
     Out of reach there is none: they are interpolated there.
@@ -44,7 +44,7 @@ def unwrapped(machine: CompiledMachine, start: FloatArray, way: FloatArray) -> F
 
 
 def continued(
-    machine: CompiledMachine, slots: FloatArray, way: FloatArray, near: FloatArray
+    machine: AnyCompiled, slots: FloatArray, way: FloatArray, near: FloatArray
 ) -> FloatArray:
     """Coordinates (N, n) where drives are at q̃ (N, drives), angles at the turns near others.
 

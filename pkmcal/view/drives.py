@@ -10,6 +10,7 @@ from pkmcal.arrays import FloatArray
 from pkmcal.core.chains import AnyMachine
 from pkmcal.core.driven import DrivenMachine
 from pkmcal.exceptions import ArgumentError
+from pkmcal.kinematics.loaded import LoadedMachine
 from pkmcal.kinematics.robot import Robot
 
 Stroke = tuple[float, float] | None
@@ -18,7 +19,7 @@ Stroke = tuple[float, float] | None
 def within(robot: Robot) -> tuple[AnyMachine, FloatArray]:
     """The machine whose actuators are the drives themselves, and its geometry."""
     machine = robot.machine
-    if not isinstance(machine, DrivenMachine):
+    if not isinstance(machine, DrivenMachine | LoadedMachine):
         return machine, robot.slots
     inner, slots, _ = machine.bare(robot.slots, np.zeros((1, robot.n_actuators)))
     return inner, slots

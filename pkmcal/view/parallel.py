@@ -39,6 +39,7 @@ def data(robot: Robot, cloud: bool) -> dict[str, Any]:
 
     With `cloud` the positions of good poses too, which take a while to find.
     """
+    said, robot = words.of_robot(robot) + words.of_yielding(robot), robot.rigid
     model = robot.model
     machine, slots = drives.within(robot)
     laws = drives.laws(robot)
@@ -60,7 +61,7 @@ def data(robot: Robot, cloud: bool) -> dict[str, Any]:
     found = {
         "kind": "limbs" if model.chains is None else "chains",
         "name": robot.name,
-        "what": words.of_robot(robot),
+        "what": said,
         "numbers": numbers,
         "geometry": numbers or len(blob) - slots.nbytes,
         "map": model.map,

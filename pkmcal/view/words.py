@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
+import numpy as np
+
 from pkmcal.arms.arm import SerialArm
 from pkmcal.core.library import POSE
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.kinematics.robot import Robot
+from pkmcal.kinematics.stiffness import stiffness
 
 SYMBOLS = {"alpha": "α", "beta": "β", "gamma": "γ"}
 _COUNTS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
@@ -48,6 +51,27 @@ def of_robot(robot: Robot) -> str:
     n = robot.n_actuators
     ways = _ways(robot.moved, moved)
     return f"A platform on {limbs}. {_count(n).capitalize()} actuators {ways}."
+
+
+def of_yielding(robot: Robot) -> str:
+    """A sentence about what a page leaves out of a machine that yields; empty for a rigid one.
+
+    Examples
+    --------
+    >>> import pkmcal as pk
+    >>> of_yielding(pk.load("hexapod").yielding({"offset*": 5e-5}))[-45:]
+    'way by 1 mm at 1.35e+03 N along its softest direction.'
+    """
+    if robot is robot.rigid:
+        return ""
+    home = robot.home
+    sag = robot.forward(robot.rigid.inverse(home), guess=home).pose[:3] - home[:3]
+    softest = float(stiffness(robot, home).softest[1])
+    return (
+        f" What yields is left out here: at home the machine sags by {np.linalg.norm(sag):.2g} mm"
+        f" under the load that its file states, and gives way by 1 mm at {softest:.3g} N along its"
+        " softest direction."
+    )
 
 
 def of_arm(arm: SerialArm) -> str:

@@ -25,6 +25,7 @@ COMMANDS = {
     "machines": ("machines",),
     "forward": ("forward", "linear-delta", "300,310,1e6"),
     "inverse": ("inverse", "hexapod", "0,0,860,0,0,0"),
+    "stiffness": ("stiffness", "hexapod", "0,0,800,0,0,0", "--compliance", "offset*=5e-5"),
     "sensitivity": ("sensitivity", "3rps"),
     "tolerance": ("tolerance", "3rps", "--sigma", "base*.z=0.1", "--samples", "100"),
     "allocation": ("tolerance", "3rps", "--allowed", "0.5", "--samples", "200"),

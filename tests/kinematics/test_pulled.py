@@ -10,7 +10,7 @@ from scipy.optimize import linprog
 from scipy.spatial import Delaunay
 
 import pkmcal as pk
-from pkmcal.geometry.load import Load
+from pkmcal.geometry.load import CableLoad
 from pkmcal.kinematics.pulled import load_of, pulled
 from pkmcal.kinematics.tensions import can_pull
 from tests.robots import made
@@ -36,7 +36,7 @@ def eight(**sections: Any) -> pk.Robot:
     return made("spatial", {"z": 1000.0}, limbs, **sections)
 
 
-def linear_program(robot: pk.Robot, pose: np.ndarray, load: Load) -> bool:
+def linear_program(robot: pk.Robot, pose: np.ndarray, load: CableLoad) -> bool:
     """Whether tensions within their bounds balance a force and its torque at a pose."""
     turn, shift = pk.screw.from_pose(pose)[:3, :3], pose[:3]
     ends = robot.slots[:, 3:6] @ turn.T
@@ -57,7 +57,7 @@ def linear_program(robot: pk.Robot, pose: np.ndarray, load: Load) -> bool:
 
 @pytest.mark.parametrize("most", [np.inf, 300.0])
 def test_cables_can_pull_where_a_linear_program_has_a_solution(most: float) -> None:
-    load = Load((10.0, -5.0, -98.1), (5.0, -10.0, 15.0), 10.0, most)
+    load = CableLoad((10.0, -5.0, -98.1), (5.0, -10.0, 15.0), 10.0, most)
     robot, rng = eight(), np.random.default_rng(0)
     drawn = rng.uniform(-1, 1, (120, 6)) * [1200, 900, 900, 0.3, 0.3, 0.3]
     poses = drawn + np.array([0, 0, 1100, 0, 0, 0])
@@ -108,7 +108,7 @@ def test_the_load_of_the_file_counts_instead() -> None:
     """Under a weight a platform hangs; what is heavy to one side pulls fewer places taut."""
     load = {"force": [0.0, 0.0, -98.1], "at": [40.0, 0.0, -30.0], "least": 5.0, "most": 400.0}
     stated, free = eight(load=load), eight()
-    assert stated.model.load == Load((0.0, 0.0, -98.1), (40.0, 0.0, -30.0), 5.0, 400.0)
+    assert stated.model.load == CableLoad((0.0, 0.0, -98.1), (40.0, 0.0, -30.0), 5.0, 400.0)
     poses = pk.sample_poses(stated, 60, share=0.8)
     given: dict[str, Any] = {"at": [40, 0, -30], "least": 5.0, "most": 400.0}
     assert pk.tensions(stated, poses).ok.all()

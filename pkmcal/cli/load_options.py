@@ -1,0 +1,91 @@
+"""Options of what a machine that yields carries, and what yields where its file does not say."""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated
+
+import typer
+
+from pkmcal.cli.rows import numbers_on_line
+from pkmcal.exceptions import ArgumentError
+from pkmcal.files.number_text import typed
+from pkmcal.geometry.carried import Load
+from pkmcal.kinematics.robot import Robot
+
+_MASSES = {"": 1.0, "kg": 1.0, "g": 1e-3, "t": 1e3, "lb": 0.45359237}  # kg
+_MASS = re.compile(r"(.*?)\s*([a-z]*)")
+
+Payload = Annotated[
+    str | None,
+    typer.Option(
+        metavar="MASS",
+        help="What a machine that yields carries, 5kg, in place of the payload its file states.",
+    ),
+]
+PayloadAt = Annotated[
+    str | None,
+    typer.Option(metavar="X,Y,Z", help="Its centre of mass in the frame of the tool, mm."),
+]
+ToolForce = Annotated[
+    str | None,
+    typer.Option(metavar="X,Y,Z", help="What pulls at the tool, N, in the axes of the base."),
+]
+Yielding = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="NAME=C",
+        help="What yields where the robot file does not say: 'offset*=5e-5', mm/N or rad/(N mm).",
+    ),
+]
+
+
+def carrying(
+    robot: Robot, payload: str | None, payload_at: str | None, tool_force: str | None
+) -> Robot:
+    """The robot with the payload of the options; itself without any."""
+    if payload is None and payload_at is None and tool_force is None:
+        return robot
+    if payload_at is not None and payload is None:
+        raise ArgumentError("--payload-at is the centre of a payload: --payload is missing")
+    load = Load(
+        0.0 if payload is None else _mass(payload),
+        _three("--payload-at", payload_at),
+        _three("--tool-force", tool_force),
+    )
+    return robot.carrying(load)
+
+
+def yielding(robot: Robot, compliances: list[str] | None) -> Robot:
+    """The robot with what the options say that yields."""
+    found: dict[str, float] = {}
+    for text in compliances or ():
+        for part in text.split(","):
+            name, equals, value = part.partition("=")
+            try:
+                found[name.strip()] = typed(value)
+            except ValueError:
+                equals = ""
+            if not equals:
+                raise ArgumentError(f"--compliance must be NAME=C, found {part!r}")
+    return robot.yielding(found) if found else robot
+
+
+def _mass(text: str) -> float:
+    match = _MASS.fullmatch(text.strip().lower())
+    try:
+        assert match is not None
+        return typed(match[1]) * _MASSES[match[2]]
+    except (ValueError, KeyError):
+        units = ", ".join(unit for unit in _MASSES if unit)
+        raise ArgumentError(f"--payload must be a mass in {units}, found {text!r}") from None
+
+
+def _three(option: str, text: str | None) -> tuple[float, float, float]:
+    if text is None:
+        return (0.0, 0.0, 0.0)
+    row = numbers_on_line(option, text, ("mm", "mm", "mm"), rad=True)
+    if row is None:
+        raise ArgumentError(f"{option} must be three numbers, found {text!r}")
+    x, y, z = row[0].tolist()
+    return (x, y, z)

@@ -1,0 +1,114 @@
+"""Numbers of what yields beside those of the limbs, and models that are made to yield."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pkmcal.arguments import number
+from pkmcal.arrays import FloatArray
+from pkmcal.core.library import SLOTS
+from pkmcal.exceptions import ArgumentError
+from pkmcal.geometry.carried import CARRIED, Load
+from pkmcal.geometry.elastic import COMPLIANCE, Elastic, Spring, is_elastic
+from pkmcal.geometry.geometry import Geometry
+from pkmcal.geometry.model import Model
+from pkmcal.geometry.ties import LimbNumber, Tie
+
+
+def widened(
+    numbers: Sequence[LimbNumber],
+    blank: FloatArray,
+    elastic: Elastic,
+    ties: Mapping[str, Tie | None],
+) -> tuple[list[LimbNumber], FloatArray]:
+    """Numbers of limbs with those of what yields behind the first row of the core's, `blank`.
+
+    These and the core's numbers, where there are none yet; `ties` says which follow parameters.
+    """
+    rows, width = blank.shape
+    units = elastic.units
+    wide = width + len(units)
+    made = []
+    for each in numbers:
+        place = each.place
+        if place is None:
+            place = each.limb * width + SLOTS.index(each.slot)
+        row, column = divmod(place, width)
+        made.append(replace(each, place=row * wide + column))
+    for j, (name, unit) in enumerate(units.items()):
+        made.append(LimbNumber(name, unit, -1, name, ties.get(name), width + j))
+    return made, np.hstack([blank, np.zeros((rows, len(units)))])
+
+
+def yielding(model: Model, compliance: Mapping[str, float]) -> Model:
+    """The model with numbers that yield, mm/N and rad/(N mm), by name or wildcard.
+
+    Raises
+    ------
+    ValueError, TypeError
+        A name that matches no number of a limb, a ratio, or a compliance below 0.
+    """
+    wanted: dict[str, float] = {}
+    for pattern, value in compliance.items():
+        number(f"compliance of {pattern}", value, least=0.0)
+        wanted |= dict.fromkeys(_matching(model, pattern), float(value))
+    known = {name: value for name, value in wanted.items() if COMPLIANCE + name in model.geometry}
+    if known:
+        changed = {COMPLIANCE + name: value for name, value in known.items()}
+        model = model.with_geometry(model.geometry.replace(changed))
+    fresh = {name: value for name, value in wanted.items() if name not in known}
+    return _with_springs(model, fresh) if fresh else model
+
+
+def _matching(model: Model, pattern: str) -> list[str]:
+    """Numbers of limbs that match, each a length or an angle."""
+    rigid = model.rigid.geometry
+    units = {each.name: each.unit for each in rigid.numbers}
+    hits = [name for name in rigid.match(pattern, "compliance") if name in units]
+    wrong = [name for name in hits if units[name] not in ("mm", "rad")]
+    if wrong or not hits:
+        what = wrong[0] if wrong else pattern
+        raise ArgumentError(f"compliance: {what} is no length and no angle of a limb")
+    return hits
+
+
+def carrying(model: Model, load: Load) -> Model:
+    """The model of a machine that yields with this payload, which its file may state.
+
+    Raises
+    ------
+    ValueError
+        A load of several rows, or parameters that drive numbers of the stated payload.
+    """
+    assert model.elastic is not None
+    values = load.rows(())
+    numbers = {f"payload.{name}": float(each) for name, each in zip(CARRIED, values, strict=True)}
+    if not model.elastic.payload:
+        model = _with(model, replace(model.elastic, payload=True), {})
+    return model.with_geometry(model.geometry.replace(numbers))
+
+
+def _with_springs(model: Model, fresh: Mapping[str, float]) -> Model:
+    rigid, before = model.rigid.geometry, model.elastic or Elastic(())
+    place = dict(zip(rigid.names, rigid.slot_index.tolist(), strict=False))
+    units = dict(zip(rigid.names, rigid.units, strict=True))
+    springs = [*before.springs, *(Spring(name, units[name]) for name in fresh)]
+    springs.sort(key=lambda spring: place[spring.number])
+    compliance = {COMPLIANCE + name: value for name, value in fresh.items()}
+    return _with(model, replace(before, springs=tuple(springs)), compliance)
+
+
+def _with(model: Model, elastic: Elastic, fresh: Mapping[str, float]) -> Model:
+    """The model with more numbers of what yields and pulls, 0 unless `fresh` states them."""
+    rigid, old = model.rigid.geometry, model.geometry
+    ties = {each.name: each.tie for each in old.numbers if is_elastic(each.name)}
+    numbers, blank = widened(rigid.numbers, rigid.blank, elastic, ties)
+    values = dict.fromkeys(elastic.units, 0.0) | dict(old.items())
+    values |= fresh
+    old_units = dict(zip(old.names, old.units, strict=True))
+    parameters = {name: old_units[name] for name in old.parameters}
+    geometry = Geometry(numbers, parameters, values, blank)
+    return replace(model, geometry=geometry, elastic=elastic)

@@ -1,0 +1,303 @@
+"""Stiffness of a machine that yields: matrices at poses, and how far it gives under test loads."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pkmcal.arguments import number
+from pkmcal.arrays import FloatArray, as_rows
+from pkmcal.display import Table, fixed
+from pkmcal.exceptions import ArgumentError
+from pkmcal.geometry.carried import CARRIED, Load
+from pkmcal.kinematics.complete import completed
+from pkmcal.kinematics.loaded import LoadedMachine
+from pkmcal.kinematics.robot import Robot, require_parallel
+from pkmcal.result import Result
+from pkmcal.screw import from_pose
+
+_NONE = 1e-12  # of the largest: a compliance that is none
+_STEPS = np.arange(1, 11) / 10.0  # of the rated load
+_WAYS = ("+x", "-x", "+y", "-y", "+z", "-z")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Stiffness(Result):
+    """How a machine yields to what pulls at its tool, for poses of any leading shape.
+
+    Of small forces beside those that act already: moments first, then forces, in the axes of the
+    base. NaN where the machine has no such pose, is singular or gives way.
+
+    Attributes
+    ----------
+    compliance : ndarray (..., 6, 6)
+        Turning and motion of the tool by moment and force: rad/(N mm), rad/N = mm/(N mm), mm/N.
+    """
+
+    compliance: FloatArray
+
+    @cached_property
+    def matrix(self) -> FloatArray:
+        """Moment and force by turning and motion, (..., 6, 6): N mm/rad, N and N/mm.
+
+        A coordinate that does not yield at all has an infinite stiffness of its own, and none
+        with others. NaN where the machine does not yield in some other direction either.
+        """
+        flat = self.compliance.reshape(-1, 6, 6)
+        out = np.full(flat.shape, np.nan)
+        for found, given in zip(out, flat, strict=True):
+            if not np.isfinite(given).all():
+                continue
+            free = np.diagonal(given) > 0.0
+            part = given[np.ix_(free, free)]
+            size = 1.0 / np.sqrt(np.diagonal(part))  # compares lengths with angles
+            scaled = part * np.outer(size, size)
+            if free.any() and np.linalg.svd(scaled, compute_uv=False)[-1] > _NONE:
+                found[:] = np.diag(np.where(free, 0.0, np.inf))
+                inverse = np.linalg.inv(scaled) * np.outer(size, size)
+                found[np.ix_(free, free)] = 0.5 * (inverse + inverse.T)
+        return out.reshape(self.compliance.shape)
+
+    def along(self, direction: ArrayLike) -> FloatArray:
+        """How far the tool gives along a direction by a force along it, mm/N.
+
+        Parameters
+        ----------
+        direction : array_like (3,)
+            In the axes of the base; of any length but 0.
+
+        Returns
+        -------
+        ndarray (...)
+        """
+        rows, shape = as_rows("direction", direction, 3)
+        if shape != () or not np.isfinite(rows).all() or not rows.any():
+            raise ArgumentError(f"direction must be three numbers, not all 0, found {direction!r}")
+        unit = rows[0] / np.linalg.norm(rows[0])
+        return np.asarray(unit @ self.compliance[..., 3:, 3:] @ unit)
+
+    def displacement(self, force: ArrayLike) -> FloatArray:
+        """How far a force at the tool, such as that of a cut, moves it: mm, (..., 3).
+
+        Parameters
+        ----------
+        force : array_like (3,)
+            N, in the axes of the base.
+        """
+        rows, shape = as_rows("force", force, 3)
+        if shape != ():
+            raise ArgumentError(f"force must have shape (3,), found {np.shape(force)}")
+        return np.asarray(self.compliance[..., 3:, 3:] @ rows[0])
+
+    @cached_property
+    def softest(self) -> tuple[FloatArray, FloatArray]:
+        """The direction in which a force moves the tool most, (..., 3), and N/mm along it (...).
+
+        The direction's largest component is positive.
+        """
+        flat = self.compliance[..., 3:, 3:].reshape(-1, 3, 3)
+        direction, stiffness = np.full((len(flat), 3), np.nan), np.full(len(flat), np.nan)
+        good = np.isfinite(flat).all(axis=(1, 2))
+        values, vectors = np.linalg.eigh(flat[good])
+        way = vectors[..., -1]
+        largest = np.argmax(np.abs(way), axis=1)[:, None]
+        way = way * np.sign(np.take_along_axis(way, largest, axis=1))
+        with np.errstate(divide="ignore"):  # nothing yields
+            stiffness[good] = 1.0 / values[:, -1]
+        direction[good] = way
+        shape = self.compliance.shape[:-2]
+        return direction.reshape(*shape, 3), stiffness.reshape(shape)
+
+    def _parts(self) -> Iterator[str | Table]:
+        direction, stiffness = self.softest
+        known = np.isfinite(stiffness)
+        yield f"stiffness at {int(known.sum())} of {known.size} poses"
+        if not known.any():
+            return
+        ways = {"along x": [1, 0, 0], "along y": [0, 1, 0], "along z": [0, 0, 1]}
+        found = {name: 1.0 / self.along(way)[known] for name, way in ways.items()}
+        found["softest"] = stiffness[known]
+        measures = (np.min, np.median, np.max)
+        yield Table(
+            ["N/mm", "least", "median", "largest"],
+            [[name, *(f"{f(each):.4g}" for f in measures)] for name, each in found.items()],
+            left=1,
+        )
+        worst = np.nanargmin(stiffness)
+        x, y, z = direction.reshape(-1, 3)[worst].round(3) + 0.0
+        yield f"softest along ({x:g}, {y:g}, {z:g}) of the base"
+
+
+def stiffness(
+    robot: Robot, poses: ArrayLike, *, load: Load | None = None, at: ArrayLike = (0.0, 0.0, 0.0)
+) -> Stiffness:
+    """How stiff a machine is at poses, by the compliances of its numbers.
+
+    Parameters
+    ----------
+    robot : Robot
+        One in which something yields.
+    poses : array_like (..., 6)
+        Where the tool is under the load, x y z in mm, α β γ in rad. Of a pose that the machine
+        cannot take, the coordinates that its file declares are kept (`Robot.complete`).
+    load : Load, optional
+        What it carries in place of the payload that its file states.
+    at : array_like (3,), optional
+        The point of the tool that forces act on and whose motion is meant, in the frame of the
+        tool, mm; its origin by default.
+
+    Returns
+    -------
+    Stiffness
+        ``.matrix``, ``.compliance``, ``.softest``, ``.along(direction)``.
+
+    Raises
+    ------
+    ValueError, TypeError
+        Nothing of the machine yields, a wrong shape, or no numbers.
+
+    Examples
+    --------
+    A hexapod on legs of 20 kN/mm, pushed from above:
+
+    >>> import pkmcal as pk
+    >>> robot = pk.load("hexapod").yielding({"offset*": 1 / 20e3})
+    >>> round(float(pk.stiffness(robot, robot.home).matrix[5, 5]), 6)
+    111923.203972
+    """
+    carrying = _yielding(robot) if load is None else _yielding(robot).under(load)
+    rows, shape = as_rows("poses", poses, 6)
+    point, point_shape = as_rows("at", at, 3)
+    if point_shape != ():
+        raise ArgumentError(f"at must have shape (3,), found {point_shape}")
+    rows = completed(carrying, rows)
+    own = np.ascontiguousarray(carrying.frames.inward(rows))
+    machine, slots = carrying.machine, carrying.slots
+    assert isinstance(machine, LoadedMachine)
+    q = machine.inverse(slots, own)
+    twists = carrying.frames.twists_outward(own, machine.yielding_twists(slots, own, q))
+    arm = from_pose(rows)[:, :3, :3] @ point[0]
+    twists[:, 3:] += np.cross(twists[:, :3], arm[:, :, None], axis=1)
+    found = np.einsum("nis,ns,njs->nij", twists, machine.compliances(slots, q), twists)
+    found[~np.isfinite(q).all(axis=1)] = np.nan
+    return Stiffness(found.reshape(*shape, 6, 6))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ComplianceTable(Result):
+    """Displacement of the tool under loads along the axes, solved anew for each.
+
+    Attributes
+    ----------
+    rated : float
+        N.
+    force : ndarray (10,)
+        10 … 100 % of the rated load, N.
+    displacement : ndarray (6, 10, 3)
+        Of the tool by each force along +x, -x, +y, -y, +z, -z of the base, mm; NaN where the
+        machine gives way.
+    """
+
+    rated: float
+    force: FloatArray
+    displacement: FloatArray
+
+    @property
+    def compliance(self) -> FloatArray:
+        """Displacement along the force per newton, (6, 10), mm/N."""
+        signs = np.array([1.0, -1.0] * 3)[:, None]
+        along = np.stack([self.displacement[i, :, i // 2] for i in range(6)])
+        return np.asarray(signs * along / self.force)
+
+    def _parts(self) -> Iterator[str | Table]:
+        yield f"static compliance up to {self.rated:g} N, mm by force along the axes of the base"
+        rows = []
+        for j, force in enumerate(self.force.tolist()):
+            sizes = np.linalg.norm(self.displacement[:, j], axis=1)
+            rows.append([f"{force:g}", *(fixed(float(size), 4) for size in sizes)])
+        rows.append(["mm/N, at most", *(f"{np.abs(each).max():.3g}" for each in self.compliance)])
+        yield Table(["force [N]", *_WAYS], rows, left=1)
+
+
+def compliance_table(
+    robot: Robot, pose: ArrayLike, rated: float = 1000.0, *, load: Load | None = None
+) -> ComplianceTable:
+    """Static compliance at a pose as ISO 9283 tests it: forces on the tool, axis by axis.
+
+    The actuators stay where they hold the pose without the force. Each force is solved for itself,
+    so that the table bends where the machine does.
+
+    Parameters
+    ----------
+    robot : Robot
+        One in which something yields.
+    pose : array_like (6,)
+        x y z in mm, α β γ in rad.
+    rated : float
+        The largest force, N.
+    load : Load, optional
+        What the machine carries besides, in place of the payload that its file states.
+
+    Returns
+    -------
+    ComplianceTable
+        Displacements by ± x y z and 10 … 100 % of the rated load.
+
+    Raises
+    ------
+    ValueError, TypeError
+        Nothing of the machine yields, it cannot hold the pose, or a wrong argument.
+
+    Examples
+    --------
+    >>> import pkmcal as pk
+    >>> robot = pk.load("hexapod").yielding({"offset*": 1 / 20e3})
+    >>> table = pk.compliance_table(robot, robot.home, rated=500)
+    >>> table.compliance[4].round(8)[:3]  # along +z
+    array([8.93e-06, 8.93e-06, 8.93e-06])
+    """
+    _yielding(robot)
+    limit = number("rated", rated, above=0.0)
+    rows, shape = as_rows("pose", pose, 6)
+    if shape != ():
+        raise ArgumentError(f"pose must have shape (6,), found {np.shape(pose)}")
+    carried = _carried(robot, load)
+    held = robot.under(_with_force(carried, np.zeros((1, 3))))
+    at = completed(held, rows)
+    q = held.inverse(at)
+    if not np.isfinite(q).all():
+        raise ArgumentError(f"pose: {robot.name} cannot hold it")
+    sense = np.repeat(np.eye(3), 2, axis=0) * np.array([1.0, -1.0] * 3)[:, None]
+    forces = (sense[:, None] * (limit * _STEPS)[:, None]).reshape(-1, 3)
+    there = robot.under(_with_force(carried, forces))
+    moved = there.forward(np.repeat(q, len(forces), axis=0), guess=at[0]).pose[:, :3]
+    before = held.forward(q, guess=at[0]).pose[0, :3]
+    return ComplianceTable(limit, limit * _STEPS, (moved - before).reshape(6, len(_STEPS), 3))
+
+
+def _yielding(robot: Robot) -> Robot:
+    require_parallel(robot)
+    if not isinstance(robot.machine, LoadedMachine):
+        raise ArgumentError(
+            f"robot: nothing of {robot.name} yields: state stiffness or [compliance] in its file"
+        )
+    return robot
+
+
+def _carried(robot: Robot, load: Load | None) -> Load:
+    """What a machine carries: the load, or the payload that its file states."""
+    if load is not None:
+        load.rows(())
+        return load
+    names = [f"payload.{name}" for name in CARRIED]
+    values = [dict(robot.geometry.items()).get(name, 0.0) for name in names]
+    return Load(values[0], values[1:4], values[4:7], values[7:10])
+
+
+def _with_force(load: Load, force: FloatArray) -> Load:
+    """The load with forces (N, 3) besides."""
+    return Load(load.mass, load.centre, np.asarray(load.force) + force, load.moment)

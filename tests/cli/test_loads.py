@@ -1,0 +1,64 @@
+"""Payloads and stiffness on the command line."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pkmcal as pk
+
+LOAD = ("--payload", "11 lb", "--payload-at", "5,0,40", "--tool-force", "0,30,-10")
+
+
+@pytest.fixture
+def stiff(tmp_path: Path) -> Path:
+    path = tmp_path / "stiff.toml"
+    pk.load("hexapod").yielding({"offset*": 1e-4}).save(path)
+    return path
+
+
+def test_poses_under_a_payload_are_those_of_the_package(run: Any, stiff: Path) -> None:
+    load = pk.Load(11 * 0.45359237, (5.0, 0.0, 40.0), (0.0, 30.0, -10.0))
+    robot, pose = pk.load(stiff), [10.0, 20.0, 820.0, 0.0, 0.0, 0.0]
+    said = json.loads(run("inverse", stiff, "10,20,820,0,0,0", *LOAD, "--json").stdout)
+    q = robot.inverse(pose, load=load)
+    assert np.abs(np.array(said["actuators"][0]) - q).max() < 1e-12
+    line = ",".join(map(repr, said["actuators"][0]))
+    said = json.loads(run("forward", stiff, line, *LOAD, "--json").stdout)
+    assert np.abs(np.array(said["pose"][0]) - pose).max() < 1e-9
+
+
+def test_stiffness_is_that_of_the_package(run: Any, stiff: Path) -> None:
+    said = json.loads(run("stiffness", stiff, "0,0,800,0,0,0", "--rated", "200", "--json").stdout)
+    robot = pk.load(stiff)
+    found = pk.stiffness(robot, robot.home)
+    assert np.abs(np.array(said["compliance"][0]) - found.compliance).max() < 1e-15
+    table = pk.compliance_table(robot, robot.home, rated=200.0)
+    assert np.abs(np.array(said["displacement"]) - table.displacement).max() < 1e-12
+    beyond = run("stiffness", stiff, "0,0,8000,0,0,0")
+    assert beyond.exit_code == 0 or "of 1 poses" in beyond.stdout
+    assert "softest" in run("stiffness", stiff).stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("inverse", "hexapod", "0,0,800,0,0,0", "--payload", "5kg"), "nothing of hexapod yields"),
+        (("stiffness", "hexapod"), "nothing of hexapod yields"),
+        (("stiffness", "hexapod", "--compliance", "offset1"), "--compliance must be NAME=C"),
+        (("forward", "3r", "0,0,0", "--payload", "5"), "carries no payload here"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(refused: Any, arguments: tuple, message: str) -> None:
+    assert message in refused(*arguments)
+
+
+def test_masses_have_known_units(refused: Any, stiff: Path) -> None:
+    said = refused("inverse", stiff, "0,0,800,0,0,0", "--payload", "5 stone")
+    assert "--payload must be a mass in kg, g, t, lb" in said
+    said = refused("inverse", stiff, "0,0,800,0,0,0", "--payload-at", "1,2,3")
+    assert "--payload is missing" in said
