@@ -37,6 +37,9 @@ _RIDGE = 1e-13  # of a normal matrix, for unknowns that no equation has
 _TOGETHER = 4096  # poses whose bases are there at once, to bound memory
 
 Whitened = tuple[FloatArray, FloatArray]  # whitened (E,), and their derivative by unknowns (E, u)
+# Of G groups of equations: squared residuals, degrees of freedom (the trace of P over each group),
+# and (G, G) the squares of P, twice what the residuals inform of the variances
+Shares = tuple[FloatArray, FloatArray, FloatArray]
 Equate = Callable[[RowStates], Whitened]
 
 
@@ -67,24 +70,6 @@ class _Alike(NamedTuple):
     equations: IntArray
     left: IntArray
     units: IntArray
-
-
-class Shares(NamedTuple):
-    """What each of G groups of equations has of the residuals.
-
-    Attributes
-    ----------
-    squares : ndarray (G,)
-        Sum of squared residuals, whitened and weighted.
-    freedom : ndarray (G,)
-        Degrees of freedom: the trace of P over the group.
-    information : ndarray (G, G)
-        Sum of the squares of P between groups: twice what the residuals inform of the variances.
-    """
-
-    squares: FloatArray
-    freedom: FloatArray
-    information: FloatArray
 
 
 class Elimination:
@@ -207,7 +192,7 @@ class Elimination:
                 rows = leverage[groups == g]
                 outer[g] += rows.T @ rows
         information += np.einsum("gij,hij->gh", outer, outer)
-        return Shares(squares, freedom, information)
+        return squares, freedom, information
 
     def best(
         self, closures: SessionClosures, machines: Machines, states: RowStates, system: Equate

@@ -409,7 +409,7 @@ class Equations:
         free = every - np.einsum("ij,ij->i", leverage, leverage)
         freedom = np.bincount(group, free, count).astype(np.float64)
         squares = np.bincount(group, residual**2, count).astype(np.float64)
-        return Shares(squares, freedom, np.diag(freedom))
+        return squares, freedom, np.diag(freedom)
 
     def failures(self, evaluation: Evaluation) -> str:
         """Say which rows failed and why; empty where the forward kinematics solved all."""

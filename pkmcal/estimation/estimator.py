@@ -157,8 +157,9 @@ class Estimator:
         left = residual - taken @ (taken.T @ residual)
         every = np.ones(len(self.equations.components))
         shares = self.equations.by_groups(evaluation, noise, every, left, taken)
-        few = (shares.freedom[self.unstated] < LEAST_FREEDOM).any()
-        return None if few or shares.freedom.sum() < prior_test.LEAST_FREEDOM else shares
+        freedom = shares[1]
+        few = (freedom[self.unstated] < LEAST_FREEDOM).any()
+        return None if few or freedom.sum() < prior_test.LEAST_FREEDOM else shares
 
     def _kept(self, noise: FloatArray, stated: FloatArray) -> FloatArray:
         """Estimated noise of groups where none is stated, else what multiplies the stated one."""

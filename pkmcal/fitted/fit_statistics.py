@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from pkmcal.estimation import misfits
 from pkmcal.estimation.estimate import Estimate
 from pkmcal.estimation.estimator import Estimator
 from pkmcal.estimation.evaluation import Evaluation
-from pkmcal.estimation.gauges import Gauges, gauges
+from pkmcal.estimation.gauges import gauges
 from pkmcal.estimation.identifiability import (
     as_sum,
     held_errors,
@@ -273,15 +273,15 @@ def identifiability(estimator: Estimator, estimate: Estimate) -> Identifiability
     """What the measurements alone determine."""
     equations, measured = estimator.equations, estimate.state.measured
     chosen = equations.parameters
-    named_freedoms = Gauges((), measured.unidentifiable)
+    names: tuple[str, ...] = ()
+    rest = measured.unidentifiable
     if equations.closures.unknowns:
-        named_freedoms = gauges(equations.parameters, measured.unidentifiable)
+        names, rest = gauges(chosen, rest)
         if len(estimate.prior):  # a tape on two anchors ends the scale, say
-            left_open = gauges(equations.parameters, estimate.state.determined.unidentifiable)
-            named_freedoms = replace(named_freedoms, texts=left_open.texts)
+            names, _ = gauges(chosen, estimate.state.determined.unidentifiable)
     if mirror_fits(equations, estimate.evaluation, estimate.state.noise):
-        named_freedoms = replace(named_freedoms, texts=(*named_freedoms.texts, MIRROR))
-    open_ones = sparse_basis(named_freedoms.rest, chosen.names).T
+        names = (*names, MIRROR)
+    open_ones = sparse_basis(rest, chosen.names).T
     return Identifiability(
         rank=measured.rank,
         gap=measured.gap,
@@ -289,7 +289,7 @@ def identifiability(estimator: Estimator, estimate: Estimate) -> Identifiability
             as_sum(combination, chosen.names, chosen.units, chosen.scale)
             for combination in open_ones
         ),
-        gauges=named_freedoms.texts,
+        gauges=names,
         observability=observability(
             estimator.scaled_triangle(estimate.evaluation), len(equations.actuators), measured.rank
         ),
@@ -338,8 +338,8 @@ def misfit(
         component_noise=by_component,
         components=tuple(m.components for m in equations.sets),
         told_apart=any((relative != 1.0).any() for relative in deviations),
-        reading_noise=tuple(float(np.sqrt(part.single)) for part in split),
-        pose_noise=tuple(float(np.sqrt(part.shared)) for part in split),
+        reading_noise=tuple(float(np.sqrt(total - shared)) for total, shared in split),
+        pose_noise=tuple(float(np.sqrt(shared)) for _, shared in split),
         residuals=end.residuals,
         rows=equations.rows,
         outliers=tuple(equations.rows[named].tolist()),

@@ -62,7 +62,7 @@ def compared(
         noise(sandwich.residual / unit, sandwich.retained, fit.key),
         sandwich.data,
     )  # fmt: skip
-    expected = of_noise.total + np.einsum("ij,jk,ik->", outside, sandwich.data, outside) / len(rest)
+    expected = of_noise[0] + np.einsum("ij,jk,ik->", outside, sandwich.data, outside) / len(rest)
     return test, float(np.mean(left**2)), float(expected)
 
 
