@@ -62,7 +62,7 @@ def _distant_points(found: Solution) -> Iterator[DistantPoint]:
     """
     parameters, theta = found.fit.parameters, found.fit.end.theta
     size = _platform_size(found)
-    for (role, point), number in parameters.found_along.items():
+    for (role, point), number in parameters.nuisance.items():
         if role not in ("target", "attachment"):
             continue
         for first in np.flatnonzero(parameters.number_of == number).tolist():

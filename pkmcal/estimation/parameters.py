@@ -25,6 +25,7 @@ Prior = float | Mapping[str, float | tuple[float, float]] | None
 Known = Literal["known", "unknown"]
 KNOWN: tuple[Known, ...] = ("known", "unknown")
 Bounds = Mapping[str, tuple[float, float]] | None
+FRAME = ("frame", "")  # role and name of the unknown frame
 
 
 @dataclass(frozen=True)
@@ -80,11 +81,9 @@ class Parameters:
         For each of which some numbers were found; empty where all are common.
     places : ndarray of int
         Places in the geometry's values of the first numbers.
-    frame : int or None
-        Number of frame.x; None where the frame is known.
-    found_along : mapping
-        First number of each point, zero or artefact that is found along, by role
-        (`Dependence.role`) and name.
+    nuisance : mapping of (str, str) to int
+        First number of what is found beside the geometry, by role (`Dependence.role`) and name:
+        of the frame (`FRAME`), each point, zero or artefact.
     origin : mapping
         Where the six parameters of a frame or tool count from, by the first: the base in the
         instrument's frame, or the tool on the platform, is at this pose (6,) followed by them. Near
@@ -112,8 +111,7 @@ class Parameters:
     column: Mapping[tuple[int, str], int]
     sessions: tuple[str, ...]
     places: IntArray
-    frame: int | None
-    found_along: Mapping[tuple[str, str], int]
+    nuisance: Mapping[tuple[str, str], int]
     origin: Mapping[int, FloatArray]
     robot: Calibratable
     asked: Asked
@@ -177,6 +175,11 @@ class Parameters:
         return smoothness_rows(self.robot, self.places, columns, len(self))
 
     @property
+    def frame(self) -> int | None:
+        """Number of frame.x; None where the frame is known."""
+        return self.nuisance.get(FRAME)
+
+    @property
     def geometry(self) -> slice:
         """The parameters that are of the geometry: the first ones."""
         return slice(0, int(np.count_nonzero(self.number_of < len(self.places))))
@@ -184,7 +187,7 @@ class Parameters:
     @property
     def motions(self) -> tuple[int, ...]:
         """The first parameter of each frame and each tool."""
-        numbers = [n for n in (self.frame, self.found_along.get(("tool", ""))) if n is not None]
+        numbers = [self.nuisance[key] for key in (FRAME, ("tool", "")) if key in self.nuisance]
         return tuple(np.flatnonzero(np.isin(self.number_of, numbers)).tolist())
 
     def columns_of(self, datasets: Sequence[FitData]) -> ParameterMap:
@@ -262,6 +265,6 @@ class Parameters:
         numbers = np.full(dependence.given.shape, NONE, dtype=np.intp)
         for i, (name, mine) in enumerate(dependence.sought.items()):
             rows = np.flatnonzero(dependence.index == i)
-            first = self.found_along[dependence.role, name]
+            first = self.nuisance[dependence.role, name]
             numbers[rows[:, None], mine.slots] = first + np.arange(len(mine.slots))
         return numbers

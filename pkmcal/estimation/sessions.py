@@ -136,7 +136,7 @@ def in_sessions(
 
 def scopes(
     names: Sequence[str],
-    blocks: Sequence[tuple[str, slice]],
+    blocks: Mapping[tuple[str, str], slice],
     per_session: Sequence[str],
     by_set: frozenset[str],
 ) -> list[Scope]:
@@ -146,8 +146,8 @@ def scopes(
     ----------
     names : sequence of str
         Of the numbers of a row.
-    blocks : sequence of (str, slice)
-        What belongs together, with its role: the frame, each point.
+    blocks : mapping of (str, str) to slice
+        What belongs together, by role and name: the frame, each point.
     per_session : sequence of str
         Names or wildcards of what is found anew in each session.
     by_set : frozenset of str
@@ -167,7 +167,7 @@ def scopes(
             )
         for i in hits:
             found[i] = "session"
-    for role, block in blocks:
+    for (role, _), block in blocks.items():
         own = found[block]
         if "session" in own and "common" in own:
             whole = names[block.start].partition(".")[0]
