@@ -52,8 +52,6 @@ class Equations:
 
     Attributes
     ----------
-    datasets : tuple of FitData
-        The rows to fit.
     missing : int
         How many rows were left out because nothing was read there.
     prediction : Prediction
@@ -70,7 +68,6 @@ class Equations:
         What the actuators would read if no cable were slack.
     """
 
-    datasets: tuple[FitData, ...]
     missing: int
     prediction: Prediction
     whitening: Whitening
@@ -93,7 +90,6 @@ class Equations:
         ])  # fmt: skip
         blocks = row_blocks(table, unstated, missing)
         equations = cls(
-            tuple(datasets),
             missing,
             prediction,
             whitening,
@@ -104,7 +100,7 @@ class Equations:
         )
         if not closures.unknowns:
             return equations
-        prediction.refuse_free_poses([e.name for data in datasets for e in data.effects])
+        prediction.refuse_free_poses()
         of_cells = [cells is not None and cells.sigma is None] if closures.cells else []
         groups = np.concatenate([unstated, of_cells, [sigma is None]]).astype(bool)
         slack = np.zeros((len(table.actuators), closures.equations), dtype=bool)
@@ -116,6 +112,11 @@ class Equations:
     def parameters(self) -> Parameters:
         """The parameter vector."""
         return self.prediction.parameters
+
+    @property
+    def datasets(self) -> tuple[FitData, ...]:
+        """The rows to fit."""
+        return self.prediction.datasets
 
     @property
     def table(self) -> PoseTable:

@@ -142,7 +142,7 @@ def _seen(
     theta: FloatArray,
 ) -> FloatArray:
     """What rows of set `i` read in the base frame, (N, k), tools where they are laid."""
-    columns = prediction.arguments[i].columns.get("tool")
+    columns = prediction.columns[i].get("tool")
     if columns is None:
         return evaluation.predicted[i][rows]
     pose = evaluation.pose[prediction.table.pose_of[i][rows]]
@@ -209,7 +209,7 @@ def _aligned(
 
 def _free_targets(prediction: Prediction, i: int, rows: IntArray, free: BoolArray) -> IntArray:
     """Parameters (N, 3) of the target of each row of set `i`; -1 where it is not free."""
-    columns = prediction.arguments[i].columns.get("target")
+    columns = prediction.columns[i].get("target")
     if columns is None:
         return np.full((len(rows), 3), -1)
     mine = columns[rows]

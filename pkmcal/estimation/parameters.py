@@ -17,7 +17,7 @@ from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.core.poses import compose, compose_rates
 from pkmcal.estimation.fit_data import Dependence, FitData
 from pkmcal.estimation.prior_functions import PriorFunction
-from pkmcal.estimation.sessions import NONE, ParameterMap, Scope, label
+from pkmcal.estimation.sessions import NONE, Scope, label
 from pkmcal.estimation.smoothness import smoothness_rows
 from pkmcal.kinematics.calibratable import Calibratable
 
@@ -190,8 +190,12 @@ class Parameters:
         numbers = [self.nuisance[key] for key in (FRAME, ("tool", "")) if key in self.nuisance]
         return tuple(np.flatnonzero(np.isin(self.number_of, numbers)).tolist())
 
-    def columns_of(self, datasets: Sequence[FitData]) -> ParameterMap:
-        """Which parameters hold in the rows of these sets."""
+    def columns_of(self, datasets: Sequence[FitData]) -> tuple[IntArray, tuple[IntArray, ...]]:
+        """Which parameters the numbers of a row are.
+
+        Of each part (P, m), rows of one session and one set, with `NONE` where its rows have no
+        such number; and the part of each row of each set.
+        """
         place: dict[tuple[str, str], int] = {}
         part_of = []
         for data in datasets:
@@ -209,7 +213,7 @@ class Parameters:
             ]
             for part in place
         ])  # fmt: skip
-        return ParameterMap(columns, tuple(part_of), len(self))
+        return columns, tuple(part_of)
 
     def geometry_of(self, session: str | None = None) -> IntArray:
         """Parameters (g,) of the geometry in a session; in the last one by default."""
