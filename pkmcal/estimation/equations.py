@@ -349,7 +349,7 @@ class Equations:
     def residual(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
         """Measured less predicted (M,), whitened and reduced."""
         if self.system is not None:
-            return -self.system.at(evaluation, noise).reduced
+            return -self.system.at(evaluation, noise)[2]
         return self.whitening.whitened(evaluation.residuals, noise)
 
     def by_parameters(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
