@@ -47,7 +47,6 @@ def parameter_table(
     freedom = np.where(np.isfinite(stderr), uncertainty.freedom, 0.0)
     values = chosen.reported(theta)
     half = t_factor(freedom) * np.where(np.isfinite(stderr), stderr, np.inf)
-    by_design = rates @ estimate.covariance @ rates.T
     at_bound = np.zeros(len(chosen), dtype=bool)
     for bound in chosen.bounds:
         at_bound |= np.isclose(theta, bound, rtol=1e-9, atol=1e-9)
