@@ -166,13 +166,13 @@ def identify(
     0.3
     """
     machine = as_machine(robot)
-    roles, anew = unknown_roles(unknown), words("per_session", per_session)
+    roles, own = unknown_roles(unknown), words("per_session", per_session)
     fixed, find_datum = fixed_names(fix)
-    asked = Asked(free, prior, bounds, anew, by_set(roles), fixed)
+    asked = Asked(free, prior, bounds, own, by_set(roles), fixed)
     moving = effects_on(machine, effects)
-    given = as_fit_data(machine, measurements, roles, bool(anew), moving)
+    given = as_fit_data(machine, measurements, roles, bool(own), moving)
     named, drop_outliers, drop_slack = left_out(drop, sum(len(data.rows) for data in given))
-    rows = prepare(machine, given, holdout, named, bool(anew))
+    rows = prepare(machine, given, holdout, named, bool(own))
     chosen = parameters(machine, rows.fitted, asked)
     word("loss", loss, LIMITS)
     word("covariance", covariance, RULES)

@@ -56,7 +56,7 @@ def _platform_size(found: Solution) -> float:
 
 
 def _distant_points(found: Solution) -> Iterator[DistantPoint]:
-    """Points that were sought near the platform and found far away.
+    """Points that were looked for near the platform and found far away.
 
     Poses that hardly turn do not determine where a target is; noise may then carry it anywhere.
     """

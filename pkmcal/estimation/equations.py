@@ -30,7 +30,7 @@ from pkmcal.estimation.session_machines import (
     Machines,
     SessionClosures,
     closures_of_sessions,
-    commanded_closures,
+    exact_closures,
 )
 from pkmcal.estimation.whitening import Whitening
 from pkmcal.kinematics.drive_state import DriveState
@@ -89,15 +89,8 @@ class Equations:
             for m, read in zip(table.sets, whitening.read, strict=True)
         ])  # fmt: skip
         blocks = row_blocks(table, unstated, missing)
-        equations = cls(
-            missing,
-            prediction,
-            whitening,
-            closures,
-            blocks,
-            table.state,
-            table.actuators,
-        )
+        given = missing, prediction, whitening, closures, blocks, table.state, table.actuators
+        equations = cls(*given)
         if not closures.unknowns:
             return equations
         prediction.refuse_free_poses()
@@ -201,7 +194,7 @@ class Equations:
         unstated = self.unstated[: len(self.sets)]
         return replace(
             self,
-            closures=commanded_closures(self.table.poses_of_machine, self.without_slack),
+            closures=exact_closures(self.table.poses_of_machine, self.without_slack),
             blocks=row_blocks(self.table, unstated, self.missing),
         )
 
@@ -306,10 +299,7 @@ class Equations:
         return equations, equations.at(start.theta, near=near)
 
     def squares_ahead(self, theta: FloatArray, noise: FloatArray, near: Near) -> float:
-        """Sum of the squared equations at `theta` where poses are looked for, none fitted yet.
-
-        Of poses with unknowns.
-        """
+        """Sum of the squared equations where poses with unknowns are looked for, none fitted."""
         machines = self._machines(theta)
         assert self.system is not None
         states = self._states_ahead(machines, theta, near)
@@ -337,8 +327,7 @@ class Equations:
         step = (following.reshape(-1, len(theta)) @ (theta - near.theta)).reshape(
             following.shape[:2]
         )
-        if not np.isfinite(step).all():
-            step[~np.isfinite(step).all(axis=1)] = 0.0
+        step[~np.isfinite(step).all(axis=1)] = 0.0
         ahead = self.closures.moved(machines, states, step)
         if ahead.status.any():
             ahead = ahead.chosen(ahead.status == 0, self.closures.settled(machines, states))
@@ -386,21 +375,11 @@ class Equations:
         residual: FloatArray,
         leverage: FloatArray,
     ) -> Shares:
-        """Squares and degrees of freedom of each group.
+        """Squares, degrees of freedom and information of each group.
 
-        Parameters
-        ----------
-        evaluation : Evaluation
-            The equations there.
-        noise : ndarray (G,)
-            See `Whitening`.
-        weights : ndarray (B,)
-            Of the blocks.
-        residual : ndarray (M,)
-            Whitened and weighted.
-        leverage : ndarray (M, r)
-            Derivatives in directions in which the parameters' covariance is 1, weighted: the
-            squares of a row are the leverage of its equation.
+        `residual` (M,) is whitened and weighted. `leverage` (M, r) are derivatives in directions in
+        which the parameters' covariance is 1, weighted: the squares of a row are the leverage of
+        its equation. `weights` are those of the blocks (B,).
         """
         if self.system is not None:
             return self.system.by_groups(evaluation, noise, weights, residual, leverage)

@@ -28,7 +28,7 @@ from pkmcal.statistics.linear_fit import (
 )
 from pkmcal.statistics.robust_scale import median_ratio
 
-_ROUNDS = 60  # of estimating noise and unidentifiable combinations anew
+_ROUNDS = 60  # of estimating noise and unidentifiable combinations again
 _LESS = 0.1  # of the deviation to which combinations are fitted, after a search without an end
 _LEAST_WORST = 5e-3  # of the machine's size: where that is not for want of measurements
 _LEAST_FALL = 0.1  # of a mean square, which a step of scoring does not go below
@@ -257,7 +257,7 @@ class Estimator:
         return None
 
     def _revised(self, estimate: Estimate) -> IterationState:
-        """Estimate unstated noise and limits of the loss, and split the directions anew."""
+        """Estimate unstated noise and limits of the loss, and split the directions again."""
         factor, of_families = self._spread(estimate)
         noise = self._kept(estimate.state.noise * factor, estimate.state.noise)
         # while the model is still far off, outliers are units further off than most

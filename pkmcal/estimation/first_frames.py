@@ -194,15 +194,15 @@ def _aligned(
         up = values[:, 2]
         known = np.isfinite(up)
         return of_heights(up[known], places[known]) if known.any() else np.zeros(6)
-    sought, target = np.unique(columns[read, 0], return_inverse=True)
+    firsts, target = np.unique(columns[read, 0], return_inverse=True)
     pairs = PointPairs(
         values=np.where(never, 0.0, values)[read],
         point=places[read],
         turn=turns[read],
-        target=target.reshape(-1) - int(sought[0] < 0),
+        target=target.reshape(-1) - int(firsts[0] < 0),
     )
     frame, shifts = of_points(pairs)
-    for first, shift in zip(sought[sought >= 0].tolist(), shifts, strict=True):
+    for first, shift in zip(firsts[firsts >= 0].tolist(), shifts, strict=True):
         _shift(prediction, theta, free, first, shift)
     return frame
 

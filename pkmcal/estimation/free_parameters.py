@@ -147,7 +147,7 @@ def _beside_geometry(datasets: Sequence[FitData]) -> dict[tuple[str, str], Numbe
         found[FRAME] = Numbers(names, units, np.arange(6), np.zeros(6))
     for dependence in (each for data in datasets for each in data.dependences()):
         role = dependence.role
-        for name, own in dependence.sought.items():
+        for name, own in dependence.estimated.items():
             known = found.setdefault((role, name), own)
             if not np.array_equal(known.start, own.start):
                 raise ArgumentError(
@@ -195,8 +195,8 @@ def _where_read(data: FitData, point: tuple[str, str]) -> tuple[str, ...]:
         return (data.measured.sessions or ("",)) if data.framed else ()
     role, name = point
     for each in data.dependences():
-        if each.role == role and name in each.sought:
-            mine = each.index == list(each.sought).index(name)
+        if each.role == role and name in each.estimated:
+            mine = each.index == list(each.estimated).index(name)
             if mine.any():
                 session = data.measured.session
                 return ("",) if session is None else tuple(dict.fromkeys(session[mine].tolist()))

@@ -1,7 +1,7 @@
 """The parameter vector of a calibration: geometry, instrument frame, targets and attachments.
 
 What one row depends on, its *numbers*, and what the search finds, the *parameters*, are the same
-unless some numbers are found anew in each session or set: see `sessions`.
+unless some numbers are of a session or set: see `sessions`.
 """
 
 from __future__ import annotations
@@ -267,7 +267,7 @@ class Parameters:
     def numbers_of(self, dependence: Dependence) -> IntArray:
         """Numbers of an argument in each row, (N, w); `NONE` where one of it is given."""
         numbers = np.full(dependence.given.shape, NONE, dtype=np.intp)
-        for i, (name, mine) in enumerate(dependence.sought.items()):
+        for i, (name, mine) in enumerate(dependence.estimated.items()):
             rows = np.flatnonzero(dependence.index == i)
             first = self.nuisance[dependence.role, name]
             numbers[rows[:, None], mine.slots] = first + np.arange(len(mine.slots))

@@ -74,7 +74,7 @@ class Prediction:
                 if several > 1:
                     raise ArgumentError(f"effects: several arguments are called {name!r}")
         numbers = [
-            {each.argument: parameters.numbers_of(each) for each in own if each.sought}
+            {each.argument: parameters.numbers_of(each) for each in own if each.estimated}
             for own in depend
         ]
         return cls(
@@ -233,7 +233,7 @@ class Prediction:
         return At(
             pose[self.table.pose_of[i]],
             None if other is None else pose[other],
-            along=self.datasets[i].along,
+            axis=self.datasets[i].axis,
             machines=lambda: self._machines(i, theta),
             measured=measured,
         )

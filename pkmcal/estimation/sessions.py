@@ -1,4 +1,4 @@
-"""Which parameters hold in which rows: common to all, or found anew in each session or set.
+"""Which parameters hold in which rows: common to all, or of a session or set.
 
 What a row depends on are the *numbers of a row*: the free numbers of the geometry, the frame, the
 points. Each is common to all rows, or there is one of it for each session (``offset5@thursday``) or
@@ -107,7 +107,7 @@ def scopes(
     blocks : mapping of (str, str) to slice
         What belongs together, by role and name: the frame, each point.
     per_session : sequence of str
-        Names or wildcards of what is found anew in each session.
+        Names or wildcards of what each session has for itself.
     by_set : frozenset of str
         Roles that each set has for itself.
 
