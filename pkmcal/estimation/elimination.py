@@ -127,25 +127,11 @@ class Elimination:
         residual: FloatArray,
         taken: FloatArray,
     ) -> Shares:
-        """Squared residuals and degrees of freedom of each group of the original equations.
+        """The `Shares` of the groups of the original equations, of which each is of one, (E,).
 
-        Parameters
-        ----------
-        by_unknown : ndarray (E, u)
-            As for `left`.
-        group : ndarray of int (E,)
-            Which group each equation is of, counted from 0.
-        weights : ndarray (U,)
-            Of each pose with equations left.
-        residual : ndarray (M,)
-            What is left, weighted.
-        taken : ndarray (M, r)
-            Derivatives of what is left whose squares are leverages, weighted.
-
-        Returns
-        -------
-        Shares
-            With P = blocks of Q₂Q₂ᵀ less (Q₂ taken)(Q₂ taken)ᵀ, what takes noise to residuals.
+        `residual` (M,) is what is left, `taken` (M, r) derivatives of it whose squares are
+        leverages, both weighted; `weights` (U,) are of the poses with equations left. P, which
+        takes noise to residuals, is the blocks Q₂Q₂ᵀ less (Q₂ taken)(Q₂ taken)ᵀ.
         """
         count_of = int(group.max()) + 1
         squares, freedom = np.zeros(count_of), np.zeros(count_of)
@@ -178,23 +164,8 @@ class Elimination:
         steps then are too long or, damped, too short: poses that have not settled by it go on with
         Newton's.
 
-        Parameters
-        ----------
-        closures : SessionClosures
-            What the unknowns are.
-        machines : Machines
-            With the present numbers.
-        states : RowStates
-            Where to start.
-        system : callable
-            Whitened equations (E,) at states, and their derivative by the unknowns (E, u).
-
-        Returns
-        -------
-        RowStates
-            Poses that no step improves, though their gradient is not zero, have status 1.
-        (off, by_unknown, reduced)
-            The equations there.
+        The search begins at `states`; `system` gives the whitened equations at any. Poses that no
+        step improves, though their gradient is not zero, have status 1.
         """
         damping = np.zeros(self.poses)
         moving = np.ones(self.poses, dtype=bool)

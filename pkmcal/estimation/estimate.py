@@ -118,7 +118,7 @@ class Estimate:
         return self.shares[1]
 
     def with_noise(self, state: IterationState, factor: float) -> Estimate:
-        """The same of a linear loss where all noise is `factor` times what it was.
+        """The estimate of a linear loss where all noise is `factor` times what it was.
 
         Of readings alone, unless `factor` is 1: neither prior nor closures go with it.
         """

@@ -34,12 +34,7 @@ def gauges(
 ) -> tuple[tuple[str, ...], FloatArray]:
     """Tell motions of the base and the common scale from other unidentifiable combinations.
 
-    Parameters
-    ----------
-    parameters : Parameters
-        The parameter vector.
-    unidentifiable : ndarray (n, d)
-        Orthonormal columns, scaled.
+    `unidentifiable` (n, d) has orthonormal columns, scaled.
 
     Returns
     -------

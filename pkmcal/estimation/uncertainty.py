@@ -202,18 +202,10 @@ def uncertainty(
     rule: CovarianceRule,
     classes: IntArray | None = None,
 ) -> Uncertainty:
-    """Say how sure an estimate is.
+    """Say how sure an estimate is, of which `solved` made the linear model `solution`.
 
-    Parameters
-    ----------
-    estimator, estimate : Estimator, Estimate
-        The fit.
-    solution : (Labels, LinearFit)
-        What `solved` says of it.
-    rule : {"auto", "classical", "cluster"}
-        That of `identify`.
-    classes : ndarray of int (M,), optional
-        Classes of equations whose variances were estimated apart; see `unlike_components`.
+    `classes` (M,) are those of equations whose variances were estimated apart: see
+    `unlike_components`.
     """
     equations, state = estimator.equations, estimate.state
     named, fit = solution
