@@ -100,16 +100,8 @@ def scopes(
 ) -> list[Scope]:
     """Of each number of a row, whether it is common, of a session or of a set.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Of the numbers of a row.
-    blocks : mapping of (str, str) to slice
-        What belongs together, by role and name: the frame, each point.
-    per_session : sequence of str
-        Names or wildcards of what each session has for itself.
-    by_set : frozenset of str
-        Roles that each set has for itself.
+    `blocks` are what belongs together, by role and name: the frame, each point. `per_session` are
+    names or wildcards of what each session has for itself, `by_set` roles that each set has.
 
     Raises
     ------
