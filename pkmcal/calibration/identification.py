@@ -43,8 +43,8 @@ _UNIDENTIFIABLE = 1e-3  # mm a pose moves per mm along an unidentifiable combina
 class Identification(Solution, Result):
     """What `identify` found. Arrays are in the order of `free`; mm and rad.
 
-    Its numbers are attributes that its base classes describe: `ParameterTable`, `Identifiability`,
-    `Misfit`, `Repeats`, `HeldOut` for points that were not fitted, and `Solution` for the rest.
+    Its numbers are attributes that its base classes describe: `Solution`, and `HeldOut` for points
+    that were not fitted.
     """
 
     @cached_property

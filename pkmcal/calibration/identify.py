@@ -166,21 +166,21 @@ def identify(
     0.3
     """
     machine = as_machine(robot)
-    roles, anew = unknown_roles(unknown), words("per_session", per_session)
+    roles, own = unknown_roles(unknown), words("per_session", per_session)
     fixed, find_datum = fixed_names(fix)
-    asked = Asked(free, prior, bounds, anew, by_set(roles), fixed)
+    asked = Asked(free, prior, bounds, own, by_set(roles), fixed)
     moving = effects_on(machine, effects)
-    given = as_fit_data(machine, measurements, roles, bool(anew), moving)
-    out = left_out(drop, sum(len(data.rows) for data in given))
-    rows = prepare(machine, given, holdout, out.rows, bool(anew))
+    given = as_fit_data(machine, measurements, roles, bool(own), moving)
+    named, drop_outliers, drop_slack = left_out(drop, sum(len(data.rows) for data in given))
+    rows = prepare(machine, given, holdout, named, bool(own))
     chosen = parameters(machine, rows.fitted, asked)
     word("loss", loss, LIMITS)
     word("covariance", covariance, RULES)
     problem = begin(rows, chosen)
     try:
-        if out.outliers:
+        if drop_outliers:
             rows, problem = without_outliers(rows, problem, chosen)
-        if out.slack:
+        if drop_slack:
             problem = without_slack(problem)
         fitted = solve(problem, loss)
         if find_datum:
@@ -192,8 +192,8 @@ def identify(
         raise ArgumentError("; ".join([f"measurements: {error}", *hint])) from None
     fitted = with_component_noise(fitted)
     sure = judged(fitted, covariance)
-    rows, held = compare(rows, fitted, sure, out.outliers)
-    found = result(rows, fitted, sure, held, find_slack=not out.slack)
+    rows, held = compare(rows, fitted, sure, drop_outliers)
+    found = result(rows, fitted, sure, held, find_slack=not drop_slack)
     for text in found.warnings:
         warnings.warn(text, CalibrationWarning, stacklevel=3)  # of who called, beyond the adapter
     return found

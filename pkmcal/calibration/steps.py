@@ -267,12 +267,12 @@ def result(
         exact = exact.with_tension(end.states.tension)
         end = exact.at(end.theta, near=end)
     fits = misfit(estimator, estimate, sure, (problem.start, end))
-    cells = _found_slack(problem) if find_slack and fits.outliers else problem.slack
+    cells = _found_slack(problem) if find_slack and fits["outliers"] else problem.slack
     return Identification(
-        **vars(parameter_table(estimator, estimate, sure)),
-        **vars(identifiability(estimator, estimate)),
-        **vars(fits),
-        **vars(repeats(sure)),
+        **parameter_table(estimator, estimate, sure),
+        **identifiability(estimator, estimate),
+        **fits,
+        **repeats(sure),
         **vars(held),
         converged=estimate.converged,
         evaluations=estimate.evaluations,

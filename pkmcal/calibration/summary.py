@@ -12,7 +12,6 @@ from pkmcal import display
 from pkmcal.arrays import BoolArray
 from pkmcal.display import Table, first_rows
 from pkmcal.fitted.distances import Distances
-from pkmcal.fitted.fit_statistics import Identifiability, Misfit, ParameterTable
 from pkmcal.fitted.holdout import HeldOut
 from pkmcal.fitted.solution import Solution
 from pkmcal.statistics.noise import SIGNIFICANT
@@ -97,7 +96,7 @@ def _count(dof: float) -> str:
     return f"{dof:.3g}" if dof < 100 else f"{dof:.0f}"
 
 
-def _noise(misfit: Misfit) -> Iterator[str]:
+def _noise(misfit: Solution) -> Iterator[str]:
     """The noise that was estimated, what of it a pose shares, and how components differ."""
     split = [
         (own, pose)
@@ -135,7 +134,7 @@ def _of_component(name: str, deviation: float, unit: str) -> str:
 
 
 def limits(
-    identifiability: Identifiability,
+    identifiability: Solution,
     parameters: int,
     correlations: Sequence[tuple[str, str, float]],
     odd: str,
@@ -198,7 +197,7 @@ def bounds(names: Sequence[str]) -> str:
     return filled("at a bound, ± as if it were not there: ", ", ".join(names))
 
 
-def parameter_rows(table: ParameterTable) -> Iterator[str | Table]:
+def parameter_rows(table: Solution) -> Iterator[str | Table]:
     """The parameters with their uncertainty, in as many columns as one screen takes.
 
     Where few degrees of freedom are left, half widths of 95 % intervals, and a line that says so.

@@ -133,7 +133,7 @@ def _targets(fit: Fit) -> Iterator[tuple[str, list[BoolArray]]]:
 
 
 def _known_target(dependence: Dependence) -> bool:
-    return dependence.role == dependence.argument == "target" and not dependence.sought
+    return dependence.role == dependence.argument == "target" and not dependence.estimated
 
 
 def _name(fit: Fit, place: FloatArray, rows: list[BoolArray]) -> str:

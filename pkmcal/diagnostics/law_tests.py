@@ -11,7 +11,7 @@ import numpy as np
 from pkmcal.arrays import BoolArray
 from pkmcal.display import chance_text
 from pkmcal.estimation.uncertainty import Uncertainty
-from pkmcal.fitted.fit_statistics import ParameterTable
+from pkmcal.fitted.solution import Solution
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.statistics.distributions import f_tail
 
@@ -57,7 +57,7 @@ class LawTest:
 
 
 def law_tests(
-    geometry: Geometry, table: ParameterTable, uncertainty: Uncertainty, prior: BoolArray
+    geometry: Geometry, table: Solution, uncertainty: Uncertainty, prior: BoolArray
 ) -> tuple[LawTest, ...]:
     """Test the free numbers of drive laws, each kind of all limbs together.
 
@@ -65,7 +65,7 @@ def law_tests(
     ----------
     geometry : Geometry
         Of the machine.
-    table : ParameterTable
+    table : Solution
         The parameters.
     uncertainty : Uncertainty
         Of them. A sandwich of few poses is no sure measure of many numbers, as Hotelling's T² has

@@ -56,13 +56,13 @@ def _platform_size(found: Solution) -> float:
 
 
 def _distant_points(found: Solution) -> Iterator[DistantPoint]:
-    """Points that were sought near the platform and found far away.
+    """Points that were looked for near the platform and found far away.
 
     Poses that hardly turn do not determine where a target is; noise may then carry it anywhere.
     """
     parameters, theta = found.fit.parameters, found.fit.end.theta
     size = _platform_size(found)
-    for (role, point), number in parameters.found_along.items():
+    for (role, point), number in parameters.nuisance.items():
         if role not in ("target", "attachment"):
             continue
         for first in np.flatnonzero(parameters.number_of == number).tolist():

@@ -17,7 +17,7 @@ from pkmcal.exceptions import ArgumentError
 def begun(
     datasets: Sequence[FitData], chosen: Parameters, unread: int
 ) -> tuple[Equations, Equations, Evaluation]:
-    """The equations, the same with commanded poses, and where these start."""
+    """The equations, those with exact actuators, and where these start."""
     equations = Equations.of(datasets, chosen, unread)
     start = start_in_modes(equations.with_exact_actuators())
     equations = equations.with_parameters(start.parameters)
@@ -25,7 +25,7 @@ def begun(
 
 
 def estimator_at(
-    equations: Equations, commanded: Equations, start: Evaluation, loss: LossName
+    equations: Equations, exact: Equations, start: Evaluation, loss: LossName
 ) -> Estimator:
     """The estimator at its start.
 
@@ -34,8 +34,8 @@ def estimator_at(
     ValueError
         Rows that were not reached.
     """
-    if not start.ok and commanded is equations:
-        raise ArgumentError(commanded.failures(start))
+    if not start.ok and exact is equations:
+        raise ArgumentError(exact.failures(start))
     equations, own = equations.begin(start)
     if not own.ok:
         raise ArgumentError(equations.failures(own))

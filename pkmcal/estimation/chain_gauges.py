@@ -27,14 +27,7 @@ def frame_motions(
 ) -> tuple[FloatArray, FloatArray]:
     """Unidentifiable combinations that move the base or the platform's frame.
 
-    Parameters
-    ----------
-    parameters : Parameters
-        The parameter vector.
-    robot : Robot
-        Of chains.
-    unidentifiable : ndarray (n, d)
-        Orthonormal columns, scaled.
+    `unidentifiable` (n, d) has orthonormal columns, scaled.
 
     Returns
     -------

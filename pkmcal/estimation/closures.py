@@ -4,8 +4,8 @@ An estimator that gives every row a pose of its own needs three things of a mach
 pose, equations between them and what the actuators read, and how the pose moves with the unknowns
 and with the numbers of the geometry. There are three cases:
 
-* `Commanded`: as many closures as free coordinates, actuators without error. No unknowns: the pose
-  is that of the forward kinematics.
+* `ExactActuators`: as many closures as free coordinates, actuators without error. No unknowns: the
+  pose is that of the forward kinematics.
 * `NoisyActuators`: the same closures, actuators with a stated deviation. The unknowns are where the
   actuators really are; closures hold exactly, for the pose is that of the forward kinematics there.
 * `FreePoses`: more actuators than ways to move, whose closures no pose can meet at once. The
@@ -70,7 +70,7 @@ class Closures(Protocol):
         """How the platform moves with them while the unknowns are held, (K, 6, p); None: not."""
 
 
-class Commanded:
+class ExactActuators:
     """Poses that follow from what the actuators read."""
 
     unknowns = equations = cells = 0
@@ -360,7 +360,7 @@ def has_equations(robot: Calibratable, sigmas: Sequence[FloatArray | None]) -> b
 
 def closures_of(
     robot: Calibratable, read: FloatArray, sigma: FloatArray | None
-) -> Commanded | NoisyActuators | FreePoses:
+) -> ExactActuators | NoisyActuators | FreePoses:
     """What the closures of a machine say, for actuators that read so (K, n).
 
     Parameters
@@ -376,5 +376,5 @@ def closures_of(
     if isinstance(robot, Robot) and pose_steps.surplus(robot) > 0:
         return FreePoses(robot, read, one_mm(robot, read) if sigma is None else sigma)
     if sigma is None or not has_equations(robot, [sigma]):
-        return Commanded(read)
+        return ExactActuators(read)
     return NoisyActuators(read, sigma)

@@ -30,20 +30,9 @@ def as_fit_data(
     sessions: bool,
     effects: tuple[Effect, ...] = (),
 ) -> list[FitData]:
-    """The sets of measurements with what is unknown of each.
+    """The sets of measurements with what is unknown of each, as `identify` was told.
 
-    Parameters
-    ----------
-    robot : Calibratable
-        The machine.
-    measurements : Measurements or sequence of them
-        As given.
-    said : mapping
-        What `identify` was told of "frame", "target" and "attachment".
-    sessions : bool
-        Whether every row is to have a session.
-    effects : tuple of Effect
-        What moves the machine off the pose that geometry alone gives.
+    With `sessions` every row gets a session.
     """
     sets = list(measurements) if isinstance(measurements, Iterable) else [measurements]
     for measured in sets:
@@ -55,19 +44,9 @@ def as_fit_data(
     datasets, first = [], 0
     unknown = zip(*(_unknown(name, given, len(sets)) for name, given in said.items()), strict=True)
     for measured, flags, name in zip(sets, unknown, set_names(sets), strict=True):
-        of_frame, of_target, of_attachment = flags
         rows = np.arange(first, first + len(measured))
-        datasets.append(
-            FitData(
-                measured,
-                rows,
-                of_frame,
-                of_target,
-                of_attachment,
-                name,
-                effects=effects,
-            )
-        )
+        frame, target, attachment = flags
+        datasets.append(FitData(measured, rows, frame, target, attachment, name, effects=effects))
         first += len(measured)
     known = [data.measured.actuator_sigma is not None for data in datasets]
     if any(known) and not all(known):

@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -37,54 +36,14 @@ _RIDGE = 1e-13  # of a normal matrix, for unknowns that no equation has
 _TOGETHER = 4096  # poses whose bases are there at once, to bound memory
 
 Whitened = tuple[FloatArray, FloatArray]  # whitened (E,), and their derivative by unknowns (E, u)
+System = tuple[FloatArray, FloatArray, FloatArray]  # as `Whitened`, and the reduced equations (M,)
+# Poses with equally many equations left: their equations (G, k), which are left (G, k - u), which
+# blocks they are (G,), and what is across their unknowns, Q₂ (G, k, k - u)
+_Alike = tuple[IntArray, IntArray, IntArray, FloatArray]
+# Of G groups of equations: squared residuals, degrees of freedom (the trace of P over each group),
+# and (G, G) the squares of P, twice what the residuals inform of the variances
+Shares = tuple[FloatArray, FloatArray, FloatArray]
 Equate = Callable[[RowStates], Whitened]
-
-
-class System(NamedTuple):
-    """Equations at some states.
-
-    Attributes
-    ----------
-    off : ndarray (E,)
-        Predicted less measured, whitened.
-    by_unknown : ndarray (E, u)
-        Their derivative by the unknowns.
-    reduced : ndarray (M,)
-        The reduced equations: the poses have taken their part.
-    """
-
-    off: FloatArray
-    by_unknown: FloatArray
-    reduced: FloatArray
-
-
-class _Alike(NamedTuple):
-    """Poses with equally many equations left, and where these are.
-
-    The equations (G, k), what is left of them (G, k - u), and which units they are (G,).
-    """
-
-    equations: IntArray
-    left: IntArray
-    units: IntArray
-
-
-class Shares(NamedTuple):
-    """What each of G groups of equations has of the residuals.
-
-    Attributes
-    ----------
-    squares : ndarray (G,)
-        Sum of squared residuals, whitened and weighted.
-    freedom : ndarray (G,)
-        Degrees of freedom: the trace of P over the group.
-    information : ndarray (G, G)
-        Sum of the squares of P between groups: twice what the residuals inform of the variances.
-    """
-
-    squares: FloatArray
-    freedom: FloatArray
-    information: FloatArray
 
 
 class Elimination:
@@ -135,8 +94,8 @@ class Elimination:
         spread[self._order] = self._all.spread(by_unknown, left[:, None])[:, 0]
         return spread
 
-    def _bases(self, by_unknown: FloatArray) -> Iterator[tuple[_Alike, FloatArray]]:
-        """Alike poses with equations left, and Q₂ (G, k, k - u), across their unknowns."""
+    def _bases(self, by_unknown: FloatArray) -> Iterator[_Alike]:
+        """Alike poses with equations left, lot by lot."""
         first, u = np.cumsum(self._count) - self._count, self.unknowns
         for left in np.unique(self.components).tolist():
             units = np.flatnonzero(self.components == left)
@@ -148,16 +107,16 @@ class Elimination:
                 behind = np.tile(np.eye(left), (count, 1))
                 rest = poses.spread(by_unknown, behind).reshape(count, left + u, left)
                 place = self._all.place[mine, None] + np.arange(left)
-                yield _Alike(equations, place, some), rest
+                yield equations, place, some, rest
 
     def redundancy(
         self, by_unknown: FloatArray, weights: FloatArray, taken: FloatArray
     ) -> FloatArray:
         """Degrees of freedom (E,) of the original equations, as `by_groups` adds them up."""
         found = np.zeros(len(self.pose_of))
-        for of, rest in self._bases(by_unknown):
-            leverage, weight = rest @ taken[of.left], weights[of.units, None]
-            found[of.equations] = weight * (rest**2).sum(axis=2) - (leverage**2).sum(axis=2)
+        for equations, left, units, rest in self._bases(by_unknown):
+            leverage, weight = rest @ taken[left], weights[units, None]
+            found[equations] = weight * (rest**2).sum(axis=2) - (leverage**2).sum(axis=2)
         return found
 
     def by_groups(
@@ -168,34 +127,20 @@ class Elimination:
         residual: FloatArray,
         taken: FloatArray,
     ) -> Shares:
-        """Squared residuals and degrees of freedom of each group of the original equations.
+        """The `Shares` of the groups of the original equations, of which each is of one, (E,).
 
-        Parameters
-        ----------
-        by_unknown : ndarray (E, u)
-            As for `left`.
-        group : ndarray of int (E,)
-            Which group each equation is of, counted from 0.
-        weights : ndarray (U,)
-            Of each pose with equations left.
-        residual : ndarray (M,)
-            What is left, weighted.
-        taken : ndarray (M, r)
-            Derivatives of what is left whose squares are leverages, weighted.
-
-        Returns
-        -------
-        Shares
-            With P = blocks of Q₂Q₂ᵀ less (Q₂ taken)(Q₂ taken)ᵀ, what takes noise to residuals.
+        `residual` (M,) is what is left, `taken` (M, r) derivatives of it whose squares are
+        leverages, both weighted; `weights` (U,) are of the poses with equations left. P, which
+        takes noise to residuals, is the blocks Q₂Q₂ᵀ less (Q₂ taken)(Q₂ taken)ᵀ.
         """
         count_of = int(group.max()) + 1
         squares, freedom = np.zeros(count_of), np.zeros(count_of)
         information = np.zeros((count_of, count_of))
         outer = np.zeros((count_of, taken.shape[1], taken.shape[1]))
-        for of, plain in self._bases(by_unknown):
-            leverage, mine = plain @ taken[of.left], residual[of.left][:, :, None]
-            rest = np.sqrt(weights[of.units])[:, None, None] * plain
-            groups = group[of.equations]
+        for equations, left, units, plain in self._bases(by_unknown):
+            leverage, mine = plain @ taken[left], residual[left][:, :, None]
+            rest = np.sqrt(weights[units])[:, None, None] * plain
+            groups = group[equations]
             blocks = rest @ rest.transpose(0, 2, 1)
             blocks_squared = blocks * (blocks - 2.0 * leverage @ leverage.transpose(0, 2, 1))
             free = np.einsum("nii->ni", blocks) - (leverage**2).sum(axis=2)
@@ -207,7 +152,7 @@ class Elimination:
                 rows = leverage[groups == g]
                 outer[g] += rows.T @ rows
         information += np.einsum("gij,hij->gh", outer, outer)
-        return Shares(squares, freedom, information)
+        return squares, freedom, information
 
     def best(
         self, closures: SessionClosures, machines: Machines, states: RowStates, system: Equate
@@ -219,23 +164,8 @@ class Elimination:
         steps then are too long or, damped, too short: poses that have not settled by it go on with
         Newton's.
 
-        Parameters
-        ----------
-        closures : SessionClosures
-            What the unknowns are.
-        machines : Machines
-            With the present numbers.
-        states : RowStates
-            Where to start.
-        system : callable
-            Whitened equations (E,) at states, and their derivative by the unknowns (E, u).
-
-        Returns
-        -------
-        RowStates
-            Poses that no step improves, though their gradient is not zero, have status 1.
-        System
-            The equations there.
+        The search begins at `states`; `system` gives the whitened equations at any. Poses that no
+        step improves, though their gradient is not zero, have status 1.
         """
         damping = np.zeros(self.poses)
         moving = np.ones(self.poses, dtype=bool)
@@ -277,11 +207,11 @@ class Elimination:
         if unsolved.any():
             status = np.where(unsolved, 1, states.status).astype(np.int32)
             states = replace(states, status=status)
-        return states, System(*there, fit.left)
+        return states, (*there, fit.left)
 
     def at(self, there: Whitened) -> System:
         """The equations where poses are not moved."""
-        return System(*there, self._fit(there, np.zeros(self.poses)).left)
+        return *there, self._fit(there, np.zeros(self.poses)).left
 
     def _fit(self, there: Whitened, damping: FloatArray, least: float = _SETTLED) -> Fit:
         return self._all.fit(*there, damping, least, self._rounding)

@@ -30,7 +30,7 @@ from pkmcal.estimation.session_machines import (
     Machines,
     SessionClosures,
     closures_of_sessions,
-    commanded_closures,
+    exact_closures,
 )
 from pkmcal.estimation.whitening import Whitening
 from pkmcal.kinematics.drive_state import DriveState
@@ -52,8 +52,6 @@ class Equations:
 
     Attributes
     ----------
-    datasets : tuple of FitData
-        The rows to fit.
     missing : int
         How many rows were left out because nothing was read there.
     prediction : Prediction
@@ -70,7 +68,6 @@ class Equations:
         What the actuators would read if no cable were slack.
     """
 
-    datasets: tuple[FitData, ...]
     missing: int
     prediction: Prediction
     whitening: Whitening
@@ -92,19 +89,11 @@ class Equations:
             for m, read in zip(table.sets, whitening.read, strict=True)
         ])  # fmt: skip
         blocks = row_blocks(table, unstated, missing)
-        equations = cls(
-            tuple(datasets),
-            missing,
-            prediction,
-            whitening,
-            closures,
-            blocks,
-            table.state,
-            table.actuators,
-        )
+        given = missing, prediction, whitening, closures, blocks, table.state, table.actuators
+        equations = cls(*given)
         if not closures.unknowns:
             return equations
-        prediction.refuse_free_poses([e.name for data in datasets for e in data.effects])
+        prediction.refuse_free_poses()
         of_cells = [cells is not None and cells.sigma is None] if closures.cells else []
         groups = np.concatenate([unstated, of_cells, [sigma is None]]).astype(bool)
         slack = np.zeros((len(table.actuators), closures.equations), dtype=bool)
@@ -116,6 +105,11 @@ class Equations:
     def parameters(self) -> Parameters:
         """The parameter vector."""
         return self.prediction.parameters
+
+    @property
+    def datasets(self) -> tuple[FitData, ...]:
+        """The rows to fit."""
+        return self.prediction.datasets
 
     @property
     def table(self) -> PoseTable:
@@ -200,7 +194,7 @@ class Equations:
         unstated = self.unstated[: len(self.sets)]
         return replace(
             self,
-            closures=commanded_closures(self.table.poses_of_machine, self.without_slack),
+            closures=exact_closures(self.table.poses_of_machine, self.without_slack),
             blocks=row_blocks(self.table, unstated, self.missing),
         )
 
@@ -305,10 +299,7 @@ class Equations:
         return equations, equations.at(start.theta, near=near)
 
     def squares_ahead(self, theta: FloatArray, noise: FloatArray, near: Near) -> float:
-        """Sum of the squared equations at `theta` where poses are looked for, none fitted yet.
-
-        Of poses with unknowns.
-        """
+        """Sum of the squared equations where poses with unknowns are looked for, none fitted."""
         machines = self._machines(theta)
         assert self.system is not None
         states = self._states_ahead(machines, theta, near)
@@ -336,8 +327,7 @@ class Equations:
         step = (following.reshape(-1, len(theta)) @ (theta - near.theta)).reshape(
             following.shape[:2]
         )
-        if not np.isfinite(step).all():
-            step[~np.isfinite(step).all(axis=1)] = 0.0
+        step[~np.isfinite(step).all(axis=1)] = 0.0
         ahead = self.closures.moved(machines, states, step)
         if ahead.status.any():
             ahead = ahead.chosen(ahead.status == 0, self.closures.settled(machines, states))
@@ -348,7 +338,7 @@ class Equations:
     def residual(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
         """Measured less predicted (M,), whitened and reduced."""
         if self.system is not None:
-            return -self.system.at(evaluation, noise).reduced
+            return -self.system.at(evaluation, noise)[2]
         return self.whitening.whitened(evaluation.residuals, noise)
 
     def by_parameters(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
@@ -385,21 +375,11 @@ class Equations:
         residual: FloatArray,
         leverage: FloatArray,
     ) -> Shares:
-        """Squares and degrees of freedom of each group.
+        """Squares, degrees of freedom and information of each group.
 
-        Parameters
-        ----------
-        evaluation : Evaluation
-            The equations there.
-        noise : ndarray (G,)
-            See `Whitening`.
-        weights : ndarray (B,)
-            Of the blocks.
-        residual : ndarray (M,)
-            Whitened and weighted.
-        leverage : ndarray (M, r)
-            Derivatives in directions in which the parameters' covariance is 1, weighted: the
-            squares of a row are the leverage of its equation.
+        `residual` (M,) is whitened and weighted. `leverage` (M, r) are derivatives in directions in
+        which the parameters' covariance is 1, weighted: the squares of a row are the leverage of
+        its equation. `weights` are those of the blocks (B,).
         """
         if self.system is not None:
             return self.system.by_groups(evaluation, noise, weights, residual, leverage)
@@ -409,7 +389,7 @@ class Equations:
         free = every - np.einsum("ij,ij->i", leverage, leverage)
         freedom = np.bincount(group, free, count).astype(np.float64)
         squares = np.bincount(group, residual**2, count).astype(np.float64)
-        return Shares(squares, freedom, np.diag(freedom))
+        return squares, freedom, np.diag(freedom)
 
     def failures(self, evaluation: Evaluation) -> str:
         """Say which rows failed and why; empty where the forward kinematics solved all."""

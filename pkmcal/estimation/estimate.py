@@ -77,7 +77,7 @@ class Estimate:
         Scaled combinations at right angles to each other: those of `half`, and those that are not
         determined.
     shares : Shares
-        Of each group, the sum of squared residuals and what it says of the noise.
+        Of each group, the sum of squared residuals and what it says of the noise: `elimination`.
     converged, evaluations, history
         Those of the search, `Trail`.
     """
@@ -115,10 +115,10 @@ class Estimate:
     @property
     def freedom(self) -> FloatArray:
         """Equations of each group less the poses and parameters they went into, (G,)."""
-        return self.shares.freedom
+        return self.shares[1]
 
     def with_noise(self, state: IterationState, factor: float) -> Estimate:
-        """The same of a linear loss where all noise is `factor` times what it was.
+        """The estimate of a linear loss where all noise is `factor` times what it was.
 
         Of readings alone, unless `factor` is 1: neither prior nor closures go with it.
         """
@@ -129,5 +129,5 @@ class Estimate:
             residual=self.residual / factor,
             triangle=self.triangle / factor,
             basis=self.basis * factor,
-            shares=Shares(squares / factor**2, freedom, information),
+            shares=(squares / factor**2, freedom, information),
         )

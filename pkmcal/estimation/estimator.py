@@ -28,7 +28,7 @@ from pkmcal.statistics.linear_fit import (
 )
 from pkmcal.statistics.robust_scale import median_ratio
 
-_ROUNDS = 60  # of estimating noise and unidentifiable combinations anew
+_ROUNDS = 60  # of estimating noise and unidentifiable combinations again
 _LESS = 0.1  # of the deviation to which combinations are fitted, after a search without an end
 _LEAST_WORST = 5e-3  # of the machine's size: where that is not for want of measurements
 _LEAST_FALL = 0.1  # of a mean square, which a step of scoring does not go below
@@ -157,8 +157,9 @@ class Estimator:
         left = residual - taken @ (taken.T @ residual)
         every = np.ones(len(self.equations.components))
         shares = self.equations.by_groups(evaluation, noise, every, left, taken)
-        few = (shares.freedom[self.unstated] < LEAST_FREEDOM).any()
-        return None if few or shares.freedom.sum() < prior_test.LEAST_FREEDOM else shares
+        freedom = shares[1]
+        few = (freedom[self.unstated] < LEAST_FREEDOM).any()
+        return None if few or freedom.sum() < prior_test.LEAST_FREEDOM else shares
 
     def _kept(self, noise: FloatArray, stated: FloatArray) -> FloatArray:
         """Estimated noise of groups where none is stated, else what multiplies the stated one."""
@@ -256,7 +257,7 @@ class Estimator:
         return None
 
     def _revised(self, estimate: Estimate) -> IterationState:
-        """Estimate unstated noise and limits of the loss, and split the directions anew."""
+        """Estimate unstated noise and limits of the loss, and split the directions again."""
         factor, of_families = self._spread(estimate)
         noise = self._kept(estimate.state.noise * factor, estimate.state.noise)
         # while the model is still far off, outliers are units further off than most

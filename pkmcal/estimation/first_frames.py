@@ -142,7 +142,7 @@ def _seen(
     theta: FloatArray,
 ) -> FloatArray:
     """What rows of set `i` read in the base frame, (N, k), tools where they are laid."""
-    columns = prediction.arguments[i].columns.get("tool")
+    columns = prediction.columns[i].get("tool")
     if columns is None:
         return evaluation.predicted[i][rows]
     pose = evaluation.pose[prediction.table.pose_of[i][rows]]
@@ -194,22 +194,22 @@ def _aligned(
         up = values[:, 2]
         known = np.isfinite(up)
         return of_heights(up[known], places[known]) if known.any() else np.zeros(6)
-    sought, target = np.unique(columns[read, 0], return_inverse=True)
+    firsts, target = np.unique(columns[read, 0], return_inverse=True)
     pairs = PointPairs(
         values=np.where(never, 0.0, values)[read],
         point=places[read],
         turn=turns[read],
-        target=target.reshape(-1) - int(sought[0] < 0),
+        target=target.reshape(-1) - int(firsts[0] < 0),
     )
     frame, shifts = of_points(pairs)
-    for first, shift in zip(sought[sought >= 0].tolist(), shifts, strict=True):
+    for first, shift in zip(firsts[firsts >= 0].tolist(), shifts, strict=True):
         _shift(prediction, theta, free, first, shift)
     return frame
 
 
 def _free_targets(prediction: Prediction, i: int, rows: IntArray, free: BoolArray) -> IntArray:
     """Parameters (N, 3) of the target of each row of set `i`; -1 where it is not free."""
-    columns = prediction.arguments[i].columns.get("target")
+    columns = prediction.columns[i].get("target")
     if columns is None:
         return np.full((len(rows), 3), -1)
     mine = columns[rows]

@@ -1,4 +1,4 @@
-"""What readings depend on beside the pose: points, zeros, artefacts; given, or found along."""
+"""What readings depend on beside the pose: points, zeros, artefacts; given, or estimated."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ class FitData:
     rows : ndarray of int (N,)
         Their numbers in what the user gave, counted through all sets.
     unknown_frame, unknown_target, unknown_attachment : bool
-        Which of them `identify` was asked to find along.
+        Which of them `identify` was asked to estimate.
     set_name : str
         Of the set, where it has a frame or points of its own.
     starts : mapping of (str, str) to Start
-        Of all that is always found along, by role and name.
+        Where the search begins for all that is never known before, by role and name.
     effects : tuple of Effect
         What moves the machine off the pose that geometry alone gives.
     """
@@ -54,12 +54,12 @@ class FitData:
         return self.unknown_frame and self.measured.instrument.framed
 
     @property
-    def along(self) -> IntArray | None:
+    def axis(self) -> IntArray | None:
         """Of touched lines and planes, which axis of its own each row's has, (N,)."""
         touched = self.measured.touched
         if touched is None:
             return None
-        return np.array([self.starts["touch", name].along for name in touched.tolist()])
+        return np.array([self.starts["touch", name].axis for name in touched.tolist()])
 
     def dependences(self) -> Iterator[Dependence]:
         """What the readings depend on beside the pose and the frame."""

@@ -7,14 +7,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from pkmcal.arguments import did_you_mean, shown
 from pkmcal.arrays import FloatArray, IntArray, mm_per_unit
 from pkmcal.estimation.fit_data import PLACE, FitData, Numbers
-from pkmcal.estimation.parameters import Asked, Bounds, Parameters, Prior
+from pkmcal.estimation.parameters import FRAME, Asked, Bounds, Parameters, Prior
 from pkmcal.estimation.prior_functions import is_function, prior_functions
 from pkmcal.estimation.sessions import Scope, label, matches, scopes
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
@@ -47,32 +47,39 @@ def parameters(
     ValueError, TypeError
         An unknown or tied name, nothing free, a prior or a bound that does not fit.
     """
-    row = _numbers_of_a_row(robot, datasets, asked)
-    blocks = [("frame", slice(row.frame, row.frame + 6))] if row.frame is not None else []
-    blocks += [
-        (role, slice(first, first + row.width[role, name]))
-        for (role, name), first in row.found_along.items()
-    ]
-    scope = scopes(row.names, blocks, asked.per_session, asked.by_set)
-    entries = _entries(row, scope, blocks, datasets, asked.held_points)
+    geometry, places = robot.geometry, _free_places(robot, asked)
+    beside = _beside_geometry(datasets)
+    ends = np.cumsum([len(places), *(len(each.names) for each in beside.values())]).tolist()
+    blocks = dict(zip(beside, map(slice, ends, ends[1:]), strict=False))
+    numbers = [geometry.names[i] for i in places]
+    numbers += [name for each in beside.values() for name in each.names]
+    scope = scopes(numbers, blocks, asked.per_session, asked.by_set)
+    entries = _entries(len(places), scope, blocks, datasets, asked.held_points)
     number_of = np.array([number for number, _ in entries], dtype=np.intp)
-    names = tuple(row.names[j] + (f"@{behind}" if behind else "") for j, behind in entries)
-    units = tuple(row.units[j] for j in number_of)
+    names = tuple(numbers[j] + (f"@{behind}" if behind else "") for j, behind in entries)
+    every = [geometry.units[i] for i in places]
+    every += [unit for each in beside.values() for unit in each.units]
+    units = tuple(str(every[j]) for j in number_of)
     travel = max(_travel(robot, data.measured) for data in datasets)
     of_unit = {"mm": 1.0, "rad": 1.0 / robot.length, "1": 1.0 / travel}
     of_unit |= {"1/mm": 1.0 / travel**2, "1/rad": robot.length / travel**2}
     of_unit["1/mm2"] = of_unit["1/mm"] / robot.length
     pull = max(_pull(robot, data.measured) for data in datasets)
     of_unit |= {"1/N": 1.0 / travel / pull, "N": pull / robot.length}
-    scale = np.array([
-        _scale(of_unit, names[i], unit) if row.scale[j] is None else row.scale[j]
-        for i, (j, unit) in enumerate(zip(number_of.tolist(), units, strict=True))
-    ])  # fmt: skip
+    of_number = [np.full(len(places), np.nan)]  # where the unit says the scale
+    of_number += [
+        np.full(len(each.names), np.nan) if each.scale is None else each.scale
+        for each in beside.values()
+    ]
+    scale = np.concatenate(of_number)[number_of]
+    for i in np.flatnonzero(np.isnan(scale)):
+        scale[i] = _scale(of_unit, names[i], units[i])
     if like is not None:
         known = dict(zip(like.names, like.scale.tolist(), strict=True))
         scale = np.array([known.get(n, own) for n, own in zip(names, scale.tolist(), strict=True)])
-    values = np.array(row.start, dtype=np.float64)[number_of]
-    count = int(np.count_nonzero(number_of < len(row.places)))
+    starts = [geometry.values[places], *(each.start for each in beside.values())]
+    values = np.concatenate(starts)[number_of]
+    count = int(np.count_nonzero(number_of < len(places)))
     lower, upper = _bounds(asked.bounds, names, values, strict=like is None)
     made = Parameters(
         names=names,
@@ -86,9 +93,8 @@ def parameters(
         scope=tuple(scope),
         column={entry: c for c, entry in enumerate(entries)},
         sessions=_sessions(datasets) if "session" in scope else (),
-        places=row.places,
-        frame=row.frame,
-        found_along=row.found_along,
+        places=places,
+        nuisance={key: block.start for key, block in blocks.items()},
         origin={},
         robot=robot,
         asked=asked,
@@ -98,7 +104,7 @@ def parameters(
         return made
     start = dict(zip(names, zip(values.tolist(), units, strict=True), strict=True))
     columns = {session: made.geometry_of(session) for session in made.sessions or ("",)}
-    given = (asked.prior, robot, start, row.places, columns)
+    given = (asked.prior, robot, start, places, columns)
     return replace(made, functions=prior_functions(*given, strict=like is None))
 
 
@@ -111,21 +117,8 @@ def _scale(of_unit: Mapping[str, float], name: str, unit: str) -> float:
     return of_unit[unit]
 
 
-@dataclass(frozen=True, eq=False)
-class _Row:
-    """The numbers that a row depends on; see `Parameters`."""
-
-    names: list[str]
-    units: list[str]
-    start: list[float]
-    scale: list[float | None]
-    places: IntArray
-    frame: int | None
-    found_along: dict[tuple[str, str], int]
-    width: dict[tuple[str, str], int]
-
-
-def _numbers_of_a_row(robot: Calibratable, datasets: Sequence[FitData], asked: Asked) -> _Row:
+def _free_places(robot: Calibratable, asked: Asked) -> IntArray:
+    """Places of the free numbers in the geometry's values."""
     geometry, free = robot.geometry, asked.free
     if free is None:
         free = robot.model.free
@@ -143,36 +136,25 @@ def _numbers_of_a_row(robot: Calibratable, datasets: Sequence[FitData], asked: A
         chosen = [name for name in chosen if name not in held]
         if not chosen:
             raise ArgumentError("fix: no parameter is left free")
-    places = np.array([geometry.names.index(name) for name in chosen], dtype=np.intp)
-    names, units = list(chosen), [str(geometry.units[i]) for i in places]
-    start = list(geometry.values[places])
-    scale: list[float | None] = [None] * len(start)
-    frame = None
+    return np.array([geometry.names.index(name) for name in chosen], dtype=np.intp)
+
+
+def _beside_geometry(datasets: Sequence[FitData]) -> dict[tuple[str, str], Numbers]:
+    """The numbers to be found beside the geometry, by role and name: the frame comes first."""
+    found: dict[tuple[str, str], Numbers] = {}
     if any(data.framed for data in datasets):
-        frame = len(names)
-        names += [f"frame.{axis}" for axis, _ in PLACE]
-        units += [unit for _, unit in PLACE]
-        start += [0.0] * 6
-        scale += [None] * 6
-    found_along: dict[tuple[str, str], int] = {}
-    known: dict[tuple[str, str], Numbers] = {}
+        names, units = zip(*((f"frame.{axis}", unit) for axis, unit in PLACE), strict=True)
+        found[FRAME] = Numbers(names, units, np.arange(6), np.zeros(6))
     for dependence in (each for data in datasets for each in data.dependences()):
         role = dependence.role
-        for name, mine in dependence.sought.items():
-            if (role, name) in found_along:
-                if not np.array_equal(known[role, name].start, mine.start):
-                    raise ArgumentError(
-                        f"{role}: {role} {name} starts at different places in different"
-                        " measurements; give different targets different target_names"
-                    )
-                continue
-            found_along[role, name], known[role, name] = len(names), mine
-            names += mine.names
-            units += mine.units
-            start += mine.start.tolist()
-            scale += [None] * len(mine.start) if mine.scale is None else mine.scale.tolist()
-    width = {key: len(mine.names) for key, mine in known.items()}
-    return _Row(names, units, start, scale, places, frame, found_along, width)
+        for name, own in dependence.estimated.items():
+            known = found.setdefault((role, name), own)
+            if not np.array_equal(known.start, own.start):
+                raise ArgumentError(
+                    f"{role}: {role} {name} starts at different places in different"
+                    " measurements; give different targets different target_names"
+                )
+    return found
 
 
 def _sessions(datasets: Sequence[FitData]) -> tuple[str, ...]:
@@ -180,24 +162,24 @@ def _sessions(datasets: Sequence[FitData]) -> tuple[str, ...]:
 
 
 def _entries(
-    row: _Row,
+    free: int,
     scope: Sequence[Scope],
-    blocks: Sequence[tuple[str, slice]],
+    blocks: Mapping[tuple[str, str], slice],
     datasets: Sequence[FitData],
     held: frozenset[tuple[str, str]],
 ) -> list[tuple[int, str]]:
     """The parameters: the number of a row that each is, and what stands behind the @ of its name.
 
-    Those of the geometry session by session, behind what is common. Points that are held are none.
+    Those of the geometry, `free` numbers, session by session, behind what is common. Points that
+    are held are none.
     """
-    own = range(len(row.places))
+    own = range(free)
     found = [(j, "") for j in own if scope[j] == "common"]
     found += [(j, name) for name in _sessions(datasets) for j in own if scope[j] == "session"]
-    of_point = {first: (role, name) for (role, name), first in row.found_along.items()}
-    for _, block in blocks:
-        kind, point = scope[block.start], of_point.get(block.start)
+    for point, block in blocks.items():
         if point in held:
             continue
+        kind = scope[block.start]
         behind = dict.fromkeys(
             label(kind, session, data.set_name)
             for data in datasets
@@ -207,14 +189,14 @@ def _entries(
     return found
 
 
-def _where_read(data: FitData, point: tuple[str, str] | None) -> tuple[str, ...]:
-    """The sessions in which a set has readings of a point, or of the frame (None)."""
-    if point is None:
+def _where_read(data: FitData, point: tuple[str, str]) -> tuple[str, ...]:
+    """The sessions in which a set has readings of a point, or in the unknown frame."""
+    if point == FRAME:
         return (data.measured.sessions or ("",)) if data.framed else ()
     role, name = point
     for each in data.dependences():
-        if each.role == role and name in each.sought:
-            mine = each.index == list(each.sought).index(name)
+        if each.role == role and name in each.estimated:
+            mine = each.index == list(each.estimated).index(name)
             if mine.any():
                 session = data.measured.session
                 return ("",) if session is None else tuple(dict.fromkeys(session[mine].tolist()))

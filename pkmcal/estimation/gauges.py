@@ -8,8 +8,6 @@ Such combinations of parameters are named by what they are, not by their numbers
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from pkmcal.arrays import FloatArray
@@ -31,40 +29,28 @@ _OFFSET = SLOTS.index("offset")
 _SCALED = [SLOTS.index(name) for name in SLOTS if "tilt" not in name]  # gains too
 
 
-@dataclass(frozen=True, eq=False)
-class Gauges:
-    """What may move without any reading noticing.
-
-    Attributes
-    ----------
-    texts : tuple of str
-        In words.
-    rest : ndarray (n, d)
-        The other unidentifiable combinations, scaled, orthonormal.
-    """
-
-    texts: tuple[str, ...]
-    rest: FloatArray
-
-
-def gauges(parameters: Parameters, unidentifiable: FloatArray) -> Gauges:
+def gauges(
+    parameters: Parameters, unidentifiable: FloatArray
+) -> tuple[tuple[str, ...], FloatArray]:
     """Tell motions of the base and the common scale from other unidentifiable combinations.
 
-    Parameters
-    ----------
-    parameters : Parameters
-        The parameter vector.
-    unidentifiable : ndarray (n, d)
-        Orthonormal columns, scaled.
+    `unidentifiable` (n, d) has orthonormal columns, scaled.
+
+    Returns
+    -------
+    texts : tuple of str
+        What may move without any reading noticing, in words.
+    rest : ndarray (n, e)
+        The other unidentifiable combinations.
     """
     robot = parameters.robot
     if not unidentifiable.shape[1] or not isinstance(robot, Robot):
-        return Gauges((), unidentifiable)
+        return (), unidentifiable
     if robot.model.chains is not None:  # whose numbers are errors of joints, not places of points
         found, free = frame_motions(parameters, robot, unidentifiable)
         rest = np.linalg.svd(found, full_matrices=True)[0][:, found.shape[1] :]
         of_all = np.pad(np.insert(free, _SCALE, 0.0, axis=0), ((0, 1), (0, 0)))
-        return Gauges(tuple(_texts(of_all)), unidentifiable @ rest)
+        return tuple(_texts(of_all)), unidentifiable @ rest
     moves = _motions(robot)
     beside = _swivel_zeros(parameters) | _of_load(parameters)
     numbers = moves.reshape(-1, moves.shape[2])[robot.geometry.slot_index]
@@ -83,14 +69,14 @@ def gauges(parameters: Parameters, unidentifiable: FloatArray) -> Gauges:
     _, singular, rows = np.linalg.svd(np.vstack([left, outside]), full_matrices=False)
     free = rows[singular < _OUTSIDE].T  # combinations of motions
     if not free.shape[1]:
-        return Gauges((), unidentifiable)
+        return (), unidentifiable
     span = np.linalg.qr(scaled @ free).Q
     inside = unidentifiable - span @ (span.T @ unidentifiable)
     left_over, _, _ = np.linalg.svd(inside, full_matrices=False)
     count = unidentifiable.shape[1] - span.shape[1]
     of_all = np.zeros((len(there), free.shape[1]))
     of_all[there] = free
-    return Gauges(tuple(_texts(of_all)), left_over[:, :count])
+    return tuple(_texts(of_all)), left_over[:, :count]
 
 
 def _motions(robot: Robot) -> FloatArray:

@@ -184,18 +184,8 @@ class Search:
         Rows that the machine cannot reach bar the way of a step. Where that happened, the search
         goes round: first without those rows, then from there with all of them.
 
-        Parameters
-        ----------
-        trail : Trail
-            How far the search has come.
-        u : ndarray (n,)
-            Where to start.
-        noise : ndarray (G,)
-            See `Whitening`.
-        loss : Loss
-            How rows count.
-        pins : ndarray (d, n)
-            Rows that hold the combinations that measurements and prior do not identify.
+        `noise` (G,) is as in `Whitening`; `pins` (d, n) are rows that hold the combinations that
+        measurements and prior do not identify.
         """
         everything = np.zeros(len(self.equations.components), dtype=bool)
         trail, straight, cost, barred = self._minimum(trail, u, noise, loss, pins, everything)

@@ -1,7 +1,7 @@
 """The parameter vector of a calibration: geometry, instrument frame, targets and attachments.
 
 What one row depends on, its *numbers*, and what the search finds, the *parameters*, are the same
-unless some numbers are found anew in each session or set: see `sessions`.
+unless some numbers are of a session or set: see `sessions`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.core.poses import compose, compose_rates
 from pkmcal.estimation.fit_data import Dependence, FitData
 from pkmcal.estimation.prior_functions import PriorFunction
-from pkmcal.estimation.sessions import NONE, ParameterMap, Scope, label
+from pkmcal.estimation.sessions import NONE, Scope, label
 from pkmcal.estimation.smoothness import smoothness_rows
 from pkmcal.kinematics.calibratable import Calibratable
 
@@ -25,6 +25,7 @@ Prior = float | Mapping[str, float | tuple[float, float]] | None
 Known = Literal["known", "unknown"]
 KNOWN: tuple[Known, ...] = ("known", "unknown")
 Bounds = Mapping[str, tuple[float, float]] | None
+FRAME = ("frame", "")  # role and name of the unknown frame
 
 
 @dataclass(frozen=True)
@@ -80,11 +81,9 @@ class Parameters:
         For each of which some numbers were found; empty where all are common.
     places : ndarray of int
         Places in the geometry's values of the first numbers.
-    frame : int or None
-        Number of frame.x; None where the frame is known.
-    found_along : mapping
-        First number of each point, zero or artefact that is found along, by role
-        (`Dependence.role`) and name.
+    nuisance : mapping of (str, str) to int
+        First number of what is found beside the geometry, by role (`Dependence.role`) and name:
+        of the frame (`FRAME`), each point, zero or artefact.
     origin : mapping
         Where the six parameters of a frame or tool count from, by the first: the base in the
         instrument's frame, or the tool on the platform, is at this pose (6,) followed by them. Near
@@ -112,8 +111,7 @@ class Parameters:
     column: Mapping[tuple[int, str], int]
     sessions: tuple[str, ...]
     places: IntArray
-    frame: int | None
-    found_along: Mapping[tuple[str, str], int]
+    nuisance: Mapping[tuple[str, str], int]
     origin: Mapping[int, FloatArray]
     robot: Calibratable
     asked: Asked
@@ -177,6 +175,11 @@ class Parameters:
         return smoothness_rows(self.robot, self.places, columns, len(self))
 
     @property
+    def frame(self) -> int | None:
+        """Number of frame.x; None where the frame is known."""
+        return self.nuisance.get(FRAME)
+
+    @property
     def geometry(self) -> slice:
         """The parameters that are of the geometry: the first ones."""
         return slice(0, int(np.count_nonzero(self.number_of < len(self.places))))
@@ -184,11 +187,15 @@ class Parameters:
     @property
     def motions(self) -> tuple[int, ...]:
         """The first parameter of each frame and each tool."""
-        numbers = [n for n in (self.frame, self.found_along.get(("tool", ""))) if n is not None]
+        numbers = [self.nuisance[key] for key in (FRAME, ("tool", "")) if key in self.nuisance]
         return tuple(np.flatnonzero(np.isin(self.number_of, numbers)).tolist())
 
-    def columns_of(self, datasets: Sequence[FitData]) -> ParameterMap:
-        """Which parameters hold in the rows of these sets."""
+    def columns_of(self, datasets: Sequence[FitData]) -> tuple[IntArray, tuple[IntArray, ...]]:
+        """Which parameters the numbers of a row are.
+
+        Of each part (P, m), rows of one session and one set, with `NONE` where its rows have no
+        such number; and the part of each row of each set.
+        """
         place: dict[tuple[str, str], int] = {}
         part_of = []
         for data in datasets:
@@ -206,7 +213,7 @@ class Parameters:
             ]
             for part in place
         ])  # fmt: skip
-        return ParameterMap(columns, tuple(part_of), len(self))
+        return columns, tuple(part_of)
 
     def geometry_of(self, session: str | None = None) -> IntArray:
         """Parameters (g,) of the geometry in a session; in the last one by default."""
@@ -260,8 +267,8 @@ class Parameters:
     def numbers_of(self, dependence: Dependence) -> IntArray:
         """Numbers of an argument in each row, (N, w); `NONE` where one of it is given."""
         numbers = np.full(dependence.given.shape, NONE, dtype=np.intp)
-        for i, (name, mine) in enumerate(dependence.sought.items()):
+        for i, (name, mine) in enumerate(dependence.estimated.items()):
             rows = np.flatnonzero(dependence.index == i)
-            first = self.found_along[dependence.role, name]
+            first = self.nuisance[dependence.role, name]
             numbers[rows[:, None], mine.slots] = first + np.arange(len(mine.slots))
         return numbers

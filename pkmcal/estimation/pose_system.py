@@ -89,7 +89,7 @@ class PoseSystem:
         if self.whitening.any_read:
             of_readings = self.prediction.jacobian(evaluation, self.closures)
             by_all = np.concatenate([by_all, self.whitening.whiten(of_readings, noise)])
-        by_unknown = self.at(evaluation, noise).by_unknown
+        _, by_unknown, _ = self.at(evaluation, noise)
         found, following = blocks.elimination.reduced(by_unknown, by_all)
         evaluation.cache["following"] = self, following
         return found
@@ -103,7 +103,7 @@ class PoseSystem:
         leverage: FloatArray,
     ) -> Shares:
         """As `Equations.by_groups`."""
-        by_unknown, group = self.at(evaluation, noise).by_unknown, self.blocks.group_of_equation
+        (_, by_unknown, _), group = self.at(evaluation, noise), self.blocks.group_of_equation
         return self.blocks.elimination.by_groups(by_unknown, group, weights, residual, leverage)
 
     def closure_residuals(
@@ -129,8 +129,8 @@ class PoseSystem:
         """What actuators and load cells would read at the poses less what they read (K, e)."""
         known = evaluation.cache.get("system")
         if known is not None and known[0] is self and self.blocks.counting is None:
-            _, factors, system = known
-            off = system.off[: self.blocks.slack.size].reshape(self.blocks.slack.shape)
+            _, factors, (off, _, _) = known
+            off = off[: self.blocks.slack.size].reshape(self.blocks.slack.shape)
             off = off * factors[self.blocks.groups]
         else:
             off, _ = self.closures.residual(evaluation.machines, evaluation.states)

@@ -10,9 +10,8 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.estimation.fit_data import FitData
-from pkmcal.estimation.sessions import ParameterMap
+from pkmcal.estimation.parameters import Parameters
 from pkmcal.estimation.tensioned_poses import Cells, cells_of, check_cells
-from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.kinematics.drive_state import DriveState
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.tension import filled_tension
@@ -46,6 +45,10 @@ class PoseTable:
         From where the actuators came, and the tension of what they drive, (K, n) each.
     cells : Cells or None
         What load cells read, where tensions are unknown.
+    columns : ndarray of int (P, m)
+        The parameter that each number of a row is, of each part: rows of one session and one set.
+    part_of : tuple of ndarray of int
+        Of each row of each set.
     machine_columns : ndarray of int (S, g)
         The parameters of the geometry of each machine: one, or one a session.
     machine_of_pose, command_of_pose : ndarray of int (K,)
@@ -62,6 +65,8 @@ class PoseTable:
     actuator_sigma: FloatArray | None
     state: DriveState
     cells: Cells | None
+    columns: IntArray
+    part_of: tuple[IntArray, ...]
     machine_columns: IntArray
     machine_of_pose: IntArray
     command_of_pose: IntArray
@@ -73,23 +78,13 @@ class PoseTable:
         return tuple(np.flatnonzero(self.machine_of_pose == s) for s in machines)
 
 
-def pose_table(
-    datasets: Sequence[FitData], robot: Calibratable, columns: ParameterMap, geometry: int
-) -> PoseTable:
+def pose_table(datasets: Sequence[FitData], parameters: Parameters) -> PoseTable:
     """Find the distinct poses of the rows.
 
-    Parameters
-    ----------
-    datasets : sequence of FitData
-        The rows.
-    robot : Calibratable
-        The nominal machine.
-    columns : ParameterMap
-        Which parameters hold in which row: machines of different sessions are not at the same pose
-        at the same actuators.
-    geometry : int
-        How many numbers of the geometry are free.
+    Machines of different sessions are not at the same pose at the same actuators.
     """
+    robot = parameters.robot
+    columns, part_of = parameters.columns_of(datasets)
     sets = tuple(data.measured for data in datasets)
     double = [i for i, m in enumerate(sets) if m.other is not None]
     rows = np.concatenate([data.rows for data in datasets])
@@ -97,7 +92,7 @@ def pose_table(
     cells = cells_of(robot, sources)
     known = _commands(sets, sources, cells)
     commands = np.hstack([*known.values()])
-    machine_columns, machine_of = columns.machines(geometry)
+    machine_columns, machine_of = _machines(columns[:, : len(parameters.places)], part_of)
     machine = np.concatenate([*machine_of, *(machine_of[i] for i in double)])
     several = len(machine_columns) > 1
     key = np.column_stack([commands, machine]) if several else commands
@@ -129,10 +124,22 @@ def pose_table(
         actuator_sigma=of_pose.get("sigma"),
         state=DriveState(of_pose.get("approach"), tension),
         cells=read,
+        columns=columns,
+        part_of=part_of,
         machine_columns=machine_columns,
         machine_of_pose=machine[first],
         command_of_pose=command_of_pose,
     )
+
+
+def _machines(
+    columns: IntArray, part_of: Sequence[IntArray]
+) -> tuple[IntArray, tuple[IntArray, ...]]:
+    """Different machines: columns (S, g) of their numbers, and which each row of each set has."""
+    place: dict[tuple[int, ...], int] = {}
+    of_part = np.array([place.setdefault(tuple(own), len(place)) for own in columns.tolist()])
+    different = np.array(list(place), dtype=np.intp).reshape(len(place), columns.shape[1])
+    return different, tuple(of_part[part] for part in part_of)
 
 
 def _commands(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -17,7 +17,7 @@ from pkmcal.estimation.parameters import Parameters
 from pkmcal.estimation.pose_table import PoseTable, pose_table
 from pkmcal.estimation.row_states import RowStates
 from pkmcal.estimation.session_machines import SessionClosures
-from pkmcal.estimation.sessions import NONE, ParameterMap
+from pkmcal.estimation.sessions import NONE, by_parameters
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.readings import joint_angles, orientation
@@ -30,121 +30,84 @@ Part = tuple[int, slice, FloatArray]  # a set, rows of it, and their derivative 
 
 
 @dataclass(frozen=True, eq=False)
-class Arguments:
-    """What the readings of one set depend on beside the pose.
-
-    Attributes
-    ----------
-    given : mapping of str to ndarray (N, w)
-        What is given, by the name that `Reading.predict` has for it.
-    numbers, columns : mapping of str to ndarray of int (N, w)
-        Of what is estimated, which number of a row each is, and which parameter; `NONE` where the
-        number is held.
-    along : ndarray of int (N,) or None
-        `FitData.along`.
-    frames : tuple of (int, ndarray of int)
-        The first parameter of each unknown frame, and the rows that are in it.
-    framed : bool
-        Whether the readings are in an unknown frame.
-    effects : tuple of EffectOfRows
-        What moves the platform in these rows beside the geometry.
-    of_effects : tuple of str
-        The arguments that are those of effects.
-    """
-
-    given: Mapping[str, FloatArray]
-    numbers: Mapping[str, IntArray]
-    columns: Mapping[str, IntArray]
-    along: IntArray | None
-    frames: tuple[tuple[int, IntArray], ...]
-    framed: bool
-    effects: tuple[EffectOfRows, ...]
-    of_effects: tuple[str, ...]
-
-    @classmethod
-    def of(
-        cls, data: FitData, parameters: Parameters, columns: ParameterMap, part: IntArray
-    ) -> Arguments:
-        """Of the rows of a set, each of which is of a `part` (N,) of the map."""
-        depend = list(data.dependences())
-        for name, several in Counter(each.argument for each in depend).items():
-            if several > 1:
-                raise ArgumentError(f"effects: several arguments are called {name!r}")
-        numbers = {each.argument: parameters.numbers_of(each) for each in depend if each.sought}
-        of_rows = columns.columns[part]
-        frames = []
-        if parameters.frame is not None and data.framed:
-            first = of_rows[:, parameters.frame]
-            frames = [(int(each), np.flatnonzero(first == each)) for each in np.unique(first)]
-        return cls(
-            given={each.argument: each.given for each in depend},
-            numbers=numbers,
-            columns={
-                name: np.where(own == NONE, NONE, np.take_along_axis(of_rows, own, axis=1))
-                for name, own in numbers.items()
-            },
-            along=data.along,
-            frames=tuple(frames),
-            framed=data.framed,
-            effects=tuple(effect.of_rows(data.measured) for effect in data.effects),
-            of_effects=tuple(
-                each.argument
-                for effect in data.effects
-                for each in effect.dependences(data.measured)
-            ),
-        )
-
-
-@dataclass(frozen=True, eq=False)
 class Prediction:
     """What the instruments should read at given poses, and its derivatives.
 
     Attributes
     ----------
+    datasets : tuple of FitData
+        The rows of each set as they were given; values that are fitted are those of `table`.
     table : PoseTable
         The rows and their poses.
     parameters : Parameters
         The parameter vector.
-    columns : ParameterMap
-        Which parameters hold in each row.
-    arguments : tuple of Arguments
-        What the readings of each set depend on.
+    given : tuple of mapping of str to ndarray (N, w)
+        What is given of each set, by the name that `Reading.predict` has for it.
+    numbers, columns : tuple of mapping of str to ndarray of int (N, w)
+        Of what is estimated, which number of a row each is, and which parameter; `NONE` where the
+        number is held.
+    effects : tuple of tuple of EffectOfRows
+        Those of each set.
     """
 
+    datasets: tuple[FitData, ...]
     table: PoseTable
     parameters: Parameters
-    columns: ParameterMap
-    arguments: tuple[Arguments, ...]
+    given: tuple[Mapping[str, FloatArray], ...]
+    numbers: tuple[Mapping[str, IntArray], ...]
+    columns: tuple[Mapping[str, IntArray], ...]
+    effects: tuple[tuple[EffectOfRows, ...], ...]
 
     @classmethod
     def of(cls, datasets: Sequence[FitData], parameters: Parameters) -> Prediction:
-        """Of the rows to be fitted or held out."""
-        columns = parameters.columns_of(datasets)
-        table = pose_table(datasets, parameters.robot, columns, len(parameters.places))
-        arguments = tuple(
-            Arguments.of(data, parameters, columns, part)
-            for data, part in zip(datasets, columns.part_of, strict=True)
+        """Of the rows to be fitted or held out.
+
+        Raises
+        ------
+        ValueError
+            An effect that has an argument of the name of another.
+        """
+        table = pose_table(datasets, parameters)
+        depend = [list(data.dependences()) for data in datasets]
+        for own in depend:
+            for name, several in Counter(each.argument for each in own).items():
+                if several > 1:
+                    raise ArgumentError(f"effects: several arguments are called {name!r}")
+        numbers = [
+            {each.argument: parameters.numbers_of(each) for each in own if each.estimated}
+            for own in depend
+        ]
+        return cls(
+            datasets=tuple(datasets),
+            table=table,
+            parameters=parameters,
+            given=tuple({each.argument: each.given for each in own} for own in depend),
+            numbers=tuple(numbers),
+            columns=tuple(
+                {name: _columns(table.columns[part], own) for name, own in mine.items()}
+                for mine, part in zip(numbers, table.part_of, strict=True)
+            ),
+            effects=tuple(
+                tuple(effect.of_rows(data.measured) for effect in data.effects) for data in datasets
+            ),
         )
-        return cls(table, parameters, columns, arguments)
 
     @cached_property
     def frames(self) -> RowsOfSets:
         """Rows of each set that are in each frame, by its first parameter."""
         found: RowsOfSets = {}
-        for i, each in enumerate(self.arguments):
-            for first, rows in each.frames:
-                found.setdefault(first, {})[i] = rows
+        for i, (data, part) in enumerate(zip(self.datasets, self.table.part_of, strict=True)):
+            if self.parameters.frame is not None and data.framed:
+                _collect(found, i, self.table.columns[part, self.parameters.frame])
         return found
 
     @cached_property
     def tools(self) -> RowsOfSets:
         """Rows of each set that have each tool, by its first parameter."""
         found: RowsOfSets = {}
-        for i, each in enumerate(self.arguments):
-            if "tool" in each.columns:
-                first = each.columns["tool"][:, 0]
-                for tool in np.unique(first).tolist():
-                    found.setdefault(tool, {})[i] = np.flatnonzero(first == tool)
+        for i, columns in enumerate(self.columns):
+            if "tool" in columns:
+                _collect(found, i, columns["tool"][:, 0])
         return found
 
     @cached_property
@@ -152,9 +115,8 @@ class Prediction:
         """Where a search for the poses begins: at home, or where they were read."""
         table = self.table
         guess = np.tile(self.parameters.robot.home, (len(table.actuators), 1))
-        every = zip(table.sets, table.pose_of, self.arguments, strict=True)
-        for measured, place, arguments in every:
-            elsewhere = arguments.framed or "tool" in arguments.columns
+        for i, (measured, place) in enumerate(zip(table.sets, table.pose_of, strict=True)):
+            elsewhere = self.datasets[i].framed or "tool" in self.columns[i]
             if measured.kind in ("pose", "position") and not elsewhere:
                 known = np.isfinite(measured.values)
                 ever = np.flatnonzero(known.any(axis=0))  # not across a plane, say
@@ -165,11 +127,12 @@ class Prediction:
                 guess[np.ix_(place[read], ever)] = values
         return RowStates(guess, table.actuators, np.zeros(len(guess), dtype=np.int32))
 
-    def refuse_free_poses(self, effects: Collection[str]) -> None:
+    def refuse_free_poses(self) -> None:
         """Refuse what needs exact actuators, where poses have unknowns.
 
-        Those are effects, by name, and readings of joints and between poses.
+        Those are effects, and readings of joints and between poses.
         """
+        effects = [effect.name for data in self.datasets for effect in data.effects]
         if effects:
             names = ", ".join(dict.fromkeys(effects))
             raise ArgumentError(
@@ -186,12 +149,11 @@ class Prediction:
 
     def arguments_of(self, i: int, theta: FloatArray) -> dict[str, FloatArray]:
         """What readings of set `i` depend on beside the pose, (N, w) each, for `predict`."""
-        own = self.arguments[i]
-        found = dict(own.given)
-        for name, columns in own.columns.items():
+        found = dict(self.given[i])
+        for name, columns in self.columns[i].items():
             found[name] = np.where(columns == NONE, found[name], theta[columns])
-        if "tool" in own.columns:
-            first = own.columns["tool"][:, 0].tolist()
+        if "tool" in self.columns[i]:
+            first = self.columns[i]["tool"][:, 0].tolist()
             found["tool_origin"] = np.array([self.parameters.origin[column] for column in first])
         return found
 
@@ -212,11 +174,13 @@ class Prediction:
         )
 
     def _by_geometry_alone(self, i: int, pose: FloatArray, theta: FloatArray) -> Predicted:
-        own, reading = self.arguments[i], self.table.sets[i].instrument
+        data, reading = self.datasets[i], self.table.sets[i].instrument
         numbers, at = self.arguments_of(i, theta), self._place(i, pose, theta)
-        for name in own.of_effects:
-            del numbers[name]
-        if not own.frames:
+        for effect in data.effects:
+            for each in effect.dependences(data.measured):
+                del numbers[each.argument]
+        frames = [(first, of_sets[i]) for first, of_sets in self.frames.items() if i in of_sets]
+        if not frames:
             return reading.predict(at, **numbers)
         parts = [
             reading.predict(
@@ -228,15 +192,15 @@ class Prediction:
                 ),
                 **{name: number[rows] for name, number in numbers.items()},
             )
-            for first, rows in own.frames
+            for first, rows in frames
         ]
-        return joined(parts, [rows for _, rows in own.frames])
+        return joined(parts, [rows for _, rows in frames])
 
     def _moved(
         self, i: int, predicted: Predicted, pose: FloatArray, theta: FloatArray
     ) -> Predicted:
         """What is read of set `i` where effects have moved the platform."""
-        effects = self.arguments[i].effects
+        effects = self.effects[i]
         if not effects:
             return predicted
         table = self.table
@@ -269,7 +233,7 @@ class Prediction:
         return At(
             pose[self.table.pose_of[i]],
             None if other is None else pose[other],
-            along=self.arguments[i].along,
+            axis=self.datasets[i].axis,
             machines=lambda: self._machines(i, theta),
             measured=measured,
         )
@@ -299,7 +263,7 @@ class Prediction:
         A batch is rows through all sets, and for each set that has some of these its rows and their
         derivative (b, k, n). There is one batch where poses have unknowns.
         """
-        table, count = self.table, len(self.table.rows)
+        table, count, size = self.table, len(self.table.rows), len(self.parameters)
         predicted = self.predicted(evaluation)
         direct = [
             m.instrument.by_geometry(
@@ -310,7 +274,7 @@ class Prediction:
         place = np.full(len(evaluation.pose), NONE)
         for batch in lots(count, count if closures.unknowns else _BATCH):
             some = list(self._in_sets(batch))
-            numbers = self.columns.columns.shape[1]
+            numbers = table.columns.shape[1]
             parts = [np.zeros((*predicted[i].values[rows].shape, numbers)) for i, rows in some]
             for poses, twists in closures.twists_by_numbers(
                 evaluation.machines, evaluation.states, self.parameters.places, self._poses_of(some)
@@ -325,7 +289,7 @@ class Prediction:
             found = []
             for (i, rows), part in zip(some, parts, strict=True):
                 self._add_direct(part, i, rows, predicted[i], direct[i])
-                wide = self.columns.of_rows(part, i, rows)
+                wide = by_parameters(part, table.columns, table.part_of[i][rows], size)
                 read, residual = table.sets[i].instrument, evaluation.residuals[i][rows]
                 found.append((i, rows, read.by_difference(wide, residual)))
             yield batch, found
@@ -351,7 +315,7 @@ class Prediction:
             part[:, :, : len(places)] += direct[rows]
         if seen.by_frame is not None and frame is not None:
             part[:, :, frame : frame + 6] = seen.by_frame[rows]
-        for name, numbers in self.arguments[i].numbers.items():
+        for name, numbers in self.numbers[i].items():
             own = numbers[rows]
             row, slot = np.nonzero(own != NONE)
             part[row, :, own[row, slot]] += seen.by[name][rows][row, :, slot]
@@ -373,6 +337,17 @@ class Prediction:
         pairs = [((table.pose_of[i], table.other_of[i]), rows) for i, rows in some]
         ends = [end[rows] for both, rows in pairs for end in both if end is not None]
         return np.unique(np.concatenate(ends))
+
+
+def _columns(of_rows: IntArray, numbers: IntArray) -> IntArray:
+    """The parameters (N, w) of numbers of rows (N, w) of which the parameters are (N, m)."""
+    return np.where(numbers == NONE, NONE, np.take_along_axis(of_rows, numbers, axis=1))
+
+
+def _collect(found: RowsOfSets, i: int, first: IntArray) -> None:
+    """Add the rows of set `i` whose first parameters are these (N,)."""
+    for each in np.unique(first).tolist():
+        found.setdefault(each, {})[i] = np.flatnonzero(first == each)
 
 
 def _add_motion(

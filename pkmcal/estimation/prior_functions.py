@@ -38,7 +38,7 @@ class PriorFunction:
     Attributes
     ----------
     name : str
-        As it was stated; where its numbers are anew in each session, with that behind an @.
+        As it was stated; where each session has its numbers, with the session behind an @.
     rows : ndarray (s, p + n)
         Sums of the geometry's values and of the parameters: one, or three of which it is the
         length.

@@ -19,18 +19,9 @@ def redrawn(
 ) -> tuple[Equations, Evaluation]:
     """The equations of other readings, and evaluated where these have been drawn.
 
-    Parameters
-    ----------
-    at : Evaluation
-        Where the machine is taken to be.
-    noise : ndarray (G,)
-        See `Whitening`.
-    reduced : ndarray (M,)
-        The residuals of the new readings there, as `residual`.
-    drawn : ndarray (s,), optional
-        That of `Parameters`.
-    prior_centre : ndarray (n,)
-        Another centre of the prior.
+    `at` is where the machine is taken to be, and `reduced` (M,) are the residuals of the new
+    readings there, as `Equations.residual`. `noise` (G,) is as in `Whitening`, `drawn` (s,) as in
+    `Parameters`; `prior_centre` (n,) is another centre of the prior.
     """
     errors, closures = reduced, equations.closures
     if equations.system is not None:

@@ -1,6 +1,6 @@
 """The machine of each session at its own poses, and the closures there.
 
-Where no number of the geometry is found anew in each session there is one machine, at all poses.
+Where all numbers of the geometry are common to all sessions there is one machine, at all poses.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import TypeVar
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray, lots
-from pkmcal.estimation.closures import Closures, Commanded, closures_of
+from pkmcal.estimation.closures import Closures, ExactActuators, closures_of
 from pkmcal.estimation.row_states import RowStates
 from pkmcal.estimation.sessions import by_parameters
 from pkmcal.estimation.tensioned_poses import Cells, tensioned_poses
@@ -212,9 +212,9 @@ def _driven(robot: Calibratable, state: DriveState) -> Calibratable:
     return state.of(robot) if isinstance(robot, Robot) else robot
 
 
-def commanded_closures(rows: Sequence[IntArray], read: FloatArray) -> SessionClosures:
+def exact_closures(rows: Sequence[IntArray], read: FloatArray) -> SessionClosures:
     """Poses that follow from what the actuators read."""
-    return SessionClosures([Commanded(each) for each in _apart(read, rows)], rows)
+    return SessionClosures([ExactActuators(each) for each in _apart(read, rows)], rows)
 
 
 def closures_of_sessions(

@@ -1,16 +1,16 @@
-"""Which parameters hold in which rows: common to all, or found anew in each session or set.
+"""Which parameters hold in which rows: common to all, or of a session or set.
 
 What a row depends on are the *numbers of a row*: the free numbers of the geometry, the frame, the
 points. Each is common to all rows, or there is one of it for each session (``offset5@thursday``) or
-for each set of measurements (``frame.x@2``). `ParameterMap` says which parameter of the search each
-number of a row is; everything else knows the numbers of a row alone.
+for each set of measurements (``frame.x@2``). `PoseTable.columns` says which parameter of the search
+each number of a row is; everything else knows the numbers of a row alone.
 """
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fnmatch import fnmatchcase
 from pathlib import PurePath
 from typing import Literal
@@ -24,48 +24,6 @@ from pkmcal.measurements.measurements import Measurements
 
 Scope = Literal["common", "session", "set"]
 NONE = -1  # column of a number that a row does not depend on
-
-
-@dataclass(frozen=True, eq=False)
-class ParameterMap:
-    """Where the numbers of a row are among the parameters.
-
-    Rows of one session and one set are of one part.
-
-    Attributes
-    ----------
-    columns : ndarray of int (P, m)
-        Of each part, the parameter that each number is; `NONE` where its rows have no such number.
-    part_of : tuple of ndarray of int (N,)
-        Of each row of each set.
-    size : int
-        How many parameters there are.
-    """
-
-    columns: IntArray
-    part_of: tuple[IntArray, ...]
-    size: int
-
-    @property
-    def trivial(self) -> bool:
-        """Whether the numbers of a row are the parameters themselves."""
-        return self.columns.shape == (1, self.size)
-
-    def of_rows(self, derivative: FloatArray, i: int, rows: slice) -> FloatArray:
-        """Derivative (b, k, n) by the parameters, from one (b, k, m) by the numbers of set `i`."""
-        return by_parameters(derivative, self.columns, self.part_of[i][rows], self.size)
-
-    def machines(self, geometry: int) -> tuple[IntArray, tuple[IntArray, ...]]:
-        """Different machines: columns (S, g) of their numbers, and which each row of each set has.
-
-        `geometry` says how many of the numbers of a row are of the geometry: the first ones.
-        """
-        place: dict[tuple[int, ...], int] = {}
-        of_part = np.array([
-            place.setdefault(tuple(own), len(place)) for own in self.columns[:, :geometry].tolist()
-        ])  # fmt: skip
-        columns = np.array(list(place), dtype=np.intp).reshape(len(place), geometry)
-        return columns, tuple(of_part[part] for part in self.part_of)
 
 
 def by_parameters(
@@ -136,22 +94,14 @@ def in_sessions(
 
 def scopes(
     names: Sequence[str],
-    blocks: Sequence[tuple[str, slice]],
+    blocks: Mapping[tuple[str, str], slice],
     per_session: Sequence[str],
     by_set: frozenset[str],
 ) -> list[Scope]:
     """Of each number of a row, whether it is common, of a session or of a set.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Of the numbers of a row.
-    blocks : sequence of (str, slice)
-        What belongs together, with its role: the frame, each point.
-    per_session : sequence of str
-        Names or wildcards of what is found anew in each session.
-    by_set : frozenset of str
-        Roles that each set has for itself.
+    `blocks` are what belongs together, by role and name: the frame, each point. `per_session` are
+    names or wildcards of what each session has for itself, `by_set` roles that each set has.
 
     Raises
     ------
@@ -167,7 +117,7 @@ def scopes(
             )
         for i in hits:
             found[i] = "session"
-    for role, block in blocks:
+    for (role, _), block in blocks.items():
         own = found[block]
         if "session" in own and "common" in own:
             whole = names[block.start].partition(".")[0]

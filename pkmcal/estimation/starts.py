@@ -22,7 +22,7 @@ from pkmcal.readings.unknowns import Found
 
 
 def with_starts(machine: Calibratable, datasets: Sequence[FitData]) -> list[FitData]:
-    """The same sets, with where all is that they always find along."""
+    """The sets, with where the search begins for all that is never known before."""
     found: Found = {}
     for kind in dict.fromkeys([*KINDS, *(data.measured.kind for data in datasets)]):
         mine = [data for data in datasets if data.measured.kind == kind]

@@ -19,7 +19,7 @@ from pkmcal.statistics.clusters import shared_error_score
 from pkmcal.statistics.covariance import SHARED, Covariance, CovarianceRule, covariance
 from pkmcal.statistics.linear_fit import LinearFit, in_unit_basis, numbered, unit_basis
 from pkmcal.statistics.noise import Noise, Split, joined, noise, split
-from pkmcal.statistics.pseudo_residuals import PseudoResiduals, pseudo_residuals
+from pkmcal.statistics.pseudo_residuals import pseudo_residuals
 from pkmcal.statistics.variance_components import told_apart, variance_components
 
 _ROUNDED = 1e3  # times rounding errors, below which residuals are nothing else
@@ -48,8 +48,6 @@ class Uncertainty:
         Of the equations.
     fit : LinearFit
         The linear fit at the solution, whitened.
-    pseudo : PseudoResiduals
-        Its residuals.
     covariance : Covariance
         By the rule that was asked for or that the residuals call for.
     reported : ndarray (n, p)
@@ -66,7 +64,6 @@ class Uncertainty:
 
     labels: Labels
     fit: LinearFit
-    pseudo: PseudoResiduals
     covariance: Covariance
     reported: FloatArray
     unknown: BoolArray
@@ -149,16 +146,16 @@ class Uncertainty:
         if self.equations.unstated.any() or self.fit.freedom >= FEW:
             sandwich = self.covariance.sandwich
             return noise(sandwich.residual, sandwich.retained, self.fit.key)
-        return Noise(1.0, 0.0)
+        return 1.0, 0.0
 
     def _noise(self, i: int) -> Noise:
         stated = self.stated_variances(i)
         if self.mixed:
             own = float(self.factors[i] ** 2 if stated is None else stated.mean())
             shown = self.equations.sets[i].components and not self.unknown[i]
-            return Noise(own * self.excess.total if shown else float("nan"), 0.0)
+            return own * self.excess[0] if shown else float("nan"), 0.0
         if stated is not None and self.fit.freedom < FEW:
-            return Noise(float(stated.mean()), 0.0)
+            return float(stated.mean()), 0.0
         mine = self.lengths_of(i)
         retained = self.covariance.sandwich.retained[mine]
         return noise(self.adjusted[mine], retained, numbered(self.fit.key[mine]))
@@ -195,13 +192,7 @@ class Uncertainty:
         return joined(parts)
 
 
-@dataclass(frozen=True, eq=False)
-class LinearModel:
-    """A fit as a linear model: what its equations belong to, and its residuals."""
-
-    labels: Labels
-    fit: LinearFit
-    pseudo: PseudoResiduals
+LinearModel = tuple[Labels, LinearFit]  # what equations belong to, and the fit as a linear one
 
 
 def uncertainty(
@@ -211,21 +202,13 @@ def uncertainty(
     rule: CovarianceRule,
     classes: IntArray | None = None,
 ) -> Uncertainty:
-    """Say how sure an estimate is.
+    """Say how sure an estimate is, of which `solved` made the linear model `solution`.
 
-    Parameters
-    ----------
-    estimator, estimate : Estimator, Estimate
-        The fit.
-    solution : LinearModel
-        It as a linear model.
-    rule : {"auto", "classical", "cluster"}
-        That of `identify`.
-    classes : ndarray of int (M,), optional
-        Classes of equations whose variances were estimated apart; see `unlike_components`.
+    `classes` (M,) are those of equations whose variances were estimated apart: see
+    `unlike_components`.
     """
     equations, state = estimator.equations, estimate.state
-    fit = solution.fit
+    named, fit = solution
     chosen = equations.parameters
     rates = chosen.reported_rates(estimate.evaluation.theta) * chosen.scale
     if rule == "auto" and equations.closures.unknowns and fit.clusters < len(equations.components):
@@ -237,9 +220,8 @@ def uncertainty(
     if classes is not None:
         apart = variance_components(fit, classes, _prior_residual(estimator, estimate))
     return Uncertainty(
-        labels=solution.labels,
+        labels=named,
         fit=fit,
-        pseudo=solution.pseudo,
         covariance=covariance(
             fit,
             rule,
@@ -258,21 +240,21 @@ def uncertainty(
 def solved(estimator: Estimator, estimate: Estimate) -> LinearModel:
     """The linear model at an estimate."""
     named, state = labels(estimator.equations), estimate.state
-    pseudo = PseudoResiduals(estimate.residual, 1.0, 1.0)
+    residual = estimate.residual
     if estimator.loss != "linear":
-        pseudo = pseudo_residuals(
-            estimate.residual,
+        residual, _, _ = pseudo_residuals(
+            residual,
             estimator.equations.components,
             estimate.weights,
-            state.loss.decline(estimate.residual),
+            state.loss.decline(residual),
             state.determined.rank,
         )
     back, design = estimate.half, estimate.design[:, : state.determined.rank]
     if estimator.loss != "linear":  # equations count alike, their residuals are other ones
         back = unit_basis(estimate.triangle, estimate.prior, state.determined.identifiable)
         design = estimate.change(back)
-    fit = in_unit_basis(design, pseudo.residual, estimate.prior, back, named.pose, named.component)
-    return LinearModel(named, fit, pseudo)
+    fit = in_unit_basis(design, residual, estimate.prior, back, named.pose, named.component)
+    return named, fit
 
 
 def _prior_residual(estimator: Estimator, estimate: Estimate) -> FloatArray:
@@ -303,7 +285,7 @@ def unlike_components(
         return None
     if estimator.loss != "linear" or not estimator.unstated.all() or not several:
         return None
-    named, fit = solution.labels, solution.fit
+    named, fit = solution
     if shared_error_score(fit) > SHARED:
         return None
     every = [np.tile(np.arange(len(m.components)), len(m)) for m in equations.sets]

@@ -124,7 +124,7 @@ def _held_points(
     rank = int(np.count_nonzero(singular > _OUTSIDE))
     rest: FloatArray = open_ones @ rows[rank:].T  # without any number of the geometry
     held = []
-    for point, first in chosen.found_along.items():
+    for point, first in chosen.nuisance.items():
         if point[0] not in _POINTS:
             continue
         mine = np.flatnonzero(np.isin(chosen.number_of, np.arange(first, first + 3)))

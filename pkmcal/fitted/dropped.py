@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 
@@ -24,16 +24,15 @@ FOUND: tuple[Found, ...] = ("outliers", "slack")
 _WANTED = "'outliers', 'slack' or numbers of rows"
 
 
-class LeftOut(NamedTuple):
-    """What is to be left out: rows by number, outliers, readings of slack cables."""
-
-    rows: tuple[int, ...]
-    outliers: bool
-    slack: bool
-
-
-def left_out(drop: Drop, count: int) -> LeftOut:
+def left_out(drop: Drop, count: int) -> tuple[tuple[int, ...], bool, bool]:
     """What `drop` names of measurements of so many rows.
+
+    Returns
+    -------
+    rows : tuple of int
+        Rows by number.
+    outliers, slack : bool
+        Whether outliers are left out, and readings of slack cables.
 
     Raises
     ------
@@ -55,7 +54,7 @@ def left_out(drop: Drop, count: int) -> LeftOut:
             raise ArgumentError(f"drop: the measurements have rows 0 to {count - 1}, found {each}")
         else:
             rows.add(int(each))
-    return LeftOut(tuple(sorted(rows)), "outliers" in words, "slack" in words)
+    return tuple(sorted(rows)), "outliers" in words, "slack" in words
 
 
 def without(datasets: Sequence[FitData], rows: Sequence[int]) -> list[FitData]:

@@ -63,7 +63,7 @@ class Fit:
         return basis[:, self.estimate.state.determined.rank :]
 
     def machine_combinations(self) -> int:
-        """How many combinations are determined that frames and points found along do not explain.
+        """How many combinations are determined that nuisance parameters do not explain.
 
         Of the measurements alone, whatever a prior says.
         """

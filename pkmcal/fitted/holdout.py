@@ -254,7 +254,7 @@ def _points(
         arcs = np.array(equations.arcs)[named.set_of[named.length]]
         weighted = arcs**2 * equations.whitening.variances(own.noise)[named.length]
         if uncertainty.mixed:
-            weighted += by_sigma / uncertainty.excess.total
+            weighted += by_sigma / uncertainty.excess[0]
         taken = np.clip(((by_own @ own.half) ** 2).sum(axis=1) / weighted, 0.0, 1.0)
     return _Points(
         residual=lengths(
@@ -318,7 +318,7 @@ def _of_own(
 
 def _variances(measured: Measurements, uncertainty: Uncertainty, like: int) -> FloatArray:
     """Variance of a length of each row, mm² (N,): that of the fitted set, by sigma where stated."""
-    total = uncertainty.noises[like].total
+    total = uncertainty.noises[like][0]
     own = stated_variances(measured)
     fitted = stated_variances(uncertainty.equations.sets[like])
     if own is None or fitted is None:
@@ -336,7 +336,7 @@ def _of_actuators(
     if sigma is None:
         units = mm_per_unit(robot.actuator_units, robot.length)
         sigma = np.tile(uncertainty.factors[-1] / units, (len(measured), 1))
-    return sigma * float(np.sqrt(uncertainty.excess.total))
+    return sigma * float(np.sqrt(uncertainty.excess[0]))
 
 
 def _test(
@@ -356,8 +356,9 @@ def _test(
         named.component[named.length][good],
     )
     # rows at the same actuators have their errors in common
-    common = split.shared + float(np.mean(points.by_actuators[good] / own)) * split.total
-    of_held = Noise(split.total, min(common, split.total))
+    total, shared = split
+    common = shared + float(np.mean(points.by_actuators[good] / own)) * total
+    of_held = total, min(common, total)
     taken = float(points.taken[good].mean())
     return holdout_test(fitted, held, split, uncertainty.by_cluster, of_held, taken)
 
@@ -371,11 +372,11 @@ def _fitted_lengths(uncertainty: Uncertainty, sets: IntArray) -> tuple[Lengths, 
     unit = np.zeros(len(uncertainty.fit.residual))
     if uncertainty.mixed:
         values = sandwich.residual
-        unit[:] = np.sqrt(uncertainty.excess.total)
+        unit[:] = np.sqrt(uncertainty.excess[0])
     else:
         values = uncertainty.adjusted
         for i in sets:
-            unit[uncertainty.lengths_of(int(i))] = np.sqrt(uncertainty.noises[i].total)
+            unit[uncertainty.lengths_of(int(i))] = np.sqrt(uncertainty.noises[i][0])
     mine = unit > 0
     residual = values[mine] / unit[mine]
     split = noise(residual, sandwich.retained[mine], numbered(uncertainty.fit.key[mine]))

@@ -100,7 +100,7 @@ def noise_factors(rows: Later, equations: Equations, sure: Uncertainty) -> Float
             factors.append(float(sure.factors[i]))
         else:
             stated = data.measured.sigma is not None
-            factors.append(1.0 if stated else float(np.sqrt(sure.noises[i].total)))
+            factors.append(1.0 if stated else float(np.sqrt(sure.noises[i][0])))
     unstated = equations.unstated[len(rows.data) :]  # load cells and actuators
     of_fit = sure.factors[len(sure.equations.sets) :]
     alike = len(of_fit) == len(unstated)

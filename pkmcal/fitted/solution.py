@@ -1,4 +1,4 @@
-"""The flat result of a calibration: each number is declared where it is computed."""
+"""The flat result of a calibration."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from pkmcal.arms.arm import SerialArm
-from pkmcal.arrays import BoolArray, FloatArray
+from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.effects.expansion import stated
 from pkmcal.fitted.datum import NO_DATUM, Datum
+from pkmcal.fitted.distances import Distances
 from pkmcal.fitted.fit import Fit
-from pkmcal.fitted.fit_statistics import Identifiability, Misfit, ParameterTable, Repeats
 from pkmcal.fitted.holdout import HeldOut
 from pkmcal.fitted.slack import SlackCable
 from pkmcal.kinematics.robot import Robot
@@ -33,14 +33,127 @@ _NAMES = (  # of `to_dict`, in the order in which they are written
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Solution(ParameterTable, Identifiability, Misfit, Repeats, HeldOut):
+class Solution(HeldOut):
     """A solved calibration: every number that was found, each under one name.
 
-    The base classes are what single functions of `fitted/` return, with their documentation;
-    `Solution(**vars(table), **vars(misfit), …)` sets all of them once.
+    Those of points that were not fitted are described in the base class, `HeldOut`.
 
     Attributes
     ----------
+    free : tuple of str
+        Names (n,): numbers of the geometry, then of an unknown frame and unknown targets.
+    units : tuple of str
+        Unit of each parameter: "mm", "rad" or "1" (a ratio).
+    values : ndarray
+        Identified values (n,).
+    start : ndarray
+        Values (n,) before the calibration.
+    stderr : ndarray
+        Standard deviations (n,); inf where neither measurements nor prior determine.
+
+        They know no bounds: for numbers `at_bounds` they are those without the bound.
+    parameter_dof : ndarray
+        Degrees of freedom (n,) of each `stderr`; inf where sigma says all, 0 where nothing.
+    interval95 : ndarray
+        Ends (n, 2) of intervals that hold the true value in 95 % of calibrations.
+
+        By Student's t with `parameter_dof`: with few degrees of freedom much wider than twice
+        `stderr`.
+    covariance : ndarray
+        Covariance (n, n) with stderr² on its diagonal; NaN beside an infinite variance.
+
+        By `covariance_rule`. Where it is "cluster", its rank is at most the number of poses: each
+        number in it is right, its inverse is not.
+    correlation_matrix : ndarray
+        Correlations (n, n) by the design; NaN beside parameters that are not determined.
+
+        Those of equal independent errors at the poses that were measured: few poses show what
+        each parameter's error is, not how the errors of two go together.
+    at_bounds : tuple of str
+        Parameters that ended at a bound.
+    covariance_rule : str
+        How: "classical", or "cluster" where rows of a pose share errors or a loss is robust.
+    rank : int
+        Number of combinations that the measurements alone determine, without prior.
+    gap : float
+        Singular value of the last identifiable combination over the next; inf if none.
+    unidentifiable : tuple of str
+        Combinations that change no measured quantity, as "base1.x − platform1.x".
+
+        They keep what they had, or follow the prior. Coefficients are in mm at the machine: an
+        angle counts as its arc.
+    gauges : tuple of str
+        What readings of actuators alone leave open by their nature, in words.
+
+        Where the base stands, the common scale; these combinations are not in `unidentifiable`.
+    observability : dict of str to float
+        Indices O1 … O5 of the scaled Jacobian, over the identifiable combinations.
+    rms : float
+        √(Σ r²/N) over the N fitted points, mm.
+
+        Unweighted; r is the distance of the measured from the predicted point, of a pose that of
+        its position.
+    rms_before : float
+        `rms` of the nominal machine, unknown frame and targets aligned with the readings.
+    closure_rms : float
+        How far the machine's own closures disagree at the poses found, mm of the actuators.
+
+        NaN where poses follow from the actuators exactly: as many closures as free coordinates, and
+        no `Measurements.actuator_sigma`.
+    closure_rms_before : float
+        `closure_rms` of the nominal machine.
+    closures : ndarray
+        How far off the worst closure at each pose is (K,), mm; NaN where they hold.
+    actuator_noise : float
+        Estimated deviation of what the actuators read, mm; NaN where it was stated.
+    tension_noise : float
+        Estimated deviation of what load cells read, N; NaN where it was stated.
+    tension_rms : float
+        How far tensions are off what load cells read, N; NaN where they are no unknowns.
+    redundancy : tuple of float
+        Degrees of freedom left in each set, then in load cells and closures if fitted.
+
+        Equations less what poses and parameters took of them; a deviation estimated from r of them
+        is itself good to 1/√(2 r) of it.
+    idle : int
+        How many poses say nothing, for nothing is left when they are determined.
+    chi2_per_dof : float
+        χ² per degree of freedom: about 1 if the noise is as stated; NaN without sigma.
+    dof : float
+        Degrees of freedom: equations, those of the prior included, less parameters.
+    noise : tuple of float
+        Estimated deviation of each set of measurements, mm; NaN where sigma was given.
+
+        That of residuals: what a reading has of its own and what its pose shares, the model's error
+        included. NaN, too, where no equations are left to show it.
+    component_noise : tuple of tuple of float
+        `noise` of each component, mm and rad.
+
+        Components are told apart where the residuals call for it: lengths and angles, x y and z.
+    components : tuple of tuple of str
+        What was read of each set: x, y, z.
+    told_apart : bool
+        Whether components differ in their noise.
+    reading_noise : tuple of float
+        What a single reading of each set has of its own, mm per coordinate.
+    pose_noise : tuple of float
+        What rows of one pose share beside it, mm per coordinate: pose and model errors.
+    residuals : tuple of ndarray
+        Measured less predicted (N, k) of the fitted rows of each set, mm and rad.
+    rows : ndarray of int
+        Numbers of the fitted rows, counted through all sets from 0.
+    outliers : tuple of int
+        Rows that the others contradict, numbered likewise.
+    distances_before : Distances
+        Rms, median and 95 % quantile of the nominal machine's distances to fitted points, mm.
+    distances : Distances
+        Those of the calibrated machine, and its rms without `outliers`.
+    repeatability : float
+        Scatter of repeats about their mean, mm per coordinate; NaN without repeats.
+    lack_of_fit : float
+        What the model misses at a pose beyond that scatter, mm per coordinate.
+    lack_of_fit_chance : float
+        p-value of the F test of lack of fit: small where the model misses something.
     robot : Robot or SerialArm
         The machine with the identified geometry; that of the last session.
     fit : Fit
@@ -66,6 +179,48 @@ class Solution(ParameterTable, Identifiability, Misfit, Repeats, HeldOut):
         fitted.
     """
 
+    free: tuple[str, ...]
+    units: tuple[str, ...]
+    values: FloatArray
+    start: FloatArray
+    stderr: FloatArray
+    parameter_dof: FloatArray
+    interval95: FloatArray
+    covariance: FloatArray
+    correlation_matrix: FloatArray
+    at_bounds: tuple[str, ...]
+    covariance_rule: str
+    rank: int
+    gap: float
+    unidentifiable: tuple[str, ...]
+    gauges: tuple[str, ...]
+    observability: dict[str, float]
+    rms: float
+    rms_before: float
+    closure_rms: float
+    closure_rms_before: float
+    closures: FloatArray
+    actuator_noise: float
+    tension_noise: float
+    tension_rms: float
+    redundancy: tuple[float, ...]
+    idle: int
+    chi2_per_dof: float
+    dof: float
+    noise: tuple[float, ...]
+    component_noise: tuple[tuple[float, ...], ...]
+    components: tuple[tuple[str, ...], ...]
+    told_apart: bool
+    reading_noise: tuple[float, ...]
+    pose_noise: tuple[float, ...]
+    residuals: tuple[FloatArray, ...]
+    rows: IntArray
+    outliers: tuple[int, ...]
+    distances_before: Distances
+    distances: Distances
+    repeatability: float
+    lack_of_fit: float
+    lack_of_fit_chance: float
     robot: Robot | SerialArm
     fit: Fit
     converged: bool

@@ -211,7 +211,7 @@ def plan_poses(
     free, prior
         As `identify` takes them.
     unknown : str or sequence of str
-        What `identify` will have to find along: "frame", "target".
+        What `identify` will have to estimate beside the machine: "frame", "target".
     actuator_noise : float or array_like (n,), optional
         Standard deviation of what the actuators read, mm or rad; see `Measurements`. Machines with
         more actuators than ways to move need it, for their actuators are measured, too.

@@ -97,11 +97,11 @@ def equations_of(
     unknown: str | Sequence[str],
 ) -> list[Equations]:
     """The equations that each set has in the calibration to come of all."""
-    sought = words("unknown", unknown)
-    for each in sought:
+    roles = words("unknown", unknown)
+    for each in roles:
         word("unknown", each, UNKNOWN)
     datasets = [
-        FitData(measured, np.arange(len(measured)), "frame" in sought, "target" in sought)
+        FitData(measured, np.arange(len(measured)), "frame" in roles, "target" in roles)
         for measured in sets
     ]
     datasets = with_starts(robot, datasets)

@@ -101,7 +101,7 @@ class At:
         At the second place.
     frame, origin : ndarray (6,)
         Pose of the base in the instrument's frame, counted from `origin`; None: they are one.
-    along : ndarray of int (N,) or None
+    axis : ndarray of int (N,) or None
         Of touched lines and planes, which axis of its own each row's has.
     machines : callable or None
         Gives pairs of a machine and its rows; for what the pose alone does not determine.
@@ -113,7 +113,7 @@ class At:
     other: FloatArray | None = None
     frame: FloatArray | None = None
     origin: FloatArray = field(default_factory=lambda: NOWHERE)
-    along: IntArray | None = None
+    axis: IntArray | None = None
     machines: Callable[[], Iterator[tuple[Any, IntArray]]] | None = None
     measured: Measured | None = None
 
@@ -202,7 +202,7 @@ class Reading:
 
     def simulated(self, m: Measured, solve: Solve) -> FloatArray:
         """Compute what the instrument would read without noise, (N, k)."""
-        at = At(solve(m.actuators, "q").pose, along=np.full(len(m), 2))
+        at = At(solve(m.actuators, "q").pose, axis=np.full(len(m), 2))
         return self.predict(at, **self.arguments(m)).values
 
     # differences ----------------------------------------------------------------------------------

@@ -97,7 +97,7 @@ class Touch(Reading):
         if self.artefact == "sphere":
             return distances(at.pose, target, anchor, zero)
         seen = points(at.pose, target, None, at.origin)
-        return _touched(seen, place, self.artefact, at.along)
+        return _touched(seen, place, self.artefact, at.axis)
 
     def dependences(self, data: InFit) -> Iterator[Dependence]:
         """The target, and where the artefacts are."""
@@ -246,15 +246,15 @@ def _names_touched(values: Any) -> Sequence[str] | TextArray:
 
 
 def _touched(
-    seen: Predicted, place: FloatArray, artefact: Artefact, along: IntArray | None
+    seen: Predicted, place: FloatArray, artefact: Artefact, axis: IntArray | None
 ) -> Predicted:
     inside, by_place, by_point = instruments.touched_points(place, seen.values)
     by = {"target": by_point @ seen.by["target"], "place": by_place}
     found = Predicted(inside, by_point @ seen.by_twist, by)
     if artefact == "point":
         return found
-    assert along is not None
-    across = along[:, None] + (np.array([[0]]) if artefact == "plane" else np.array([[1, 2]]))
+    assert axis is not None
+    across = axis[:, None] + (np.array([[0]]) if artefact == "plane" else np.array([[1, 2]]))
     return some_components(found, across % 3)
 
 

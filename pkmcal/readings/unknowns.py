@@ -54,7 +54,7 @@ class Dependence:
         What it is to users: "target", "anchor", "attachment", "tool", "run", "angle" …
     given : ndarray (N, w)
         Its numbers, as far as they are known.
-    sought : mapping of str to Numbers
+    estimated : mapping of str to Numbers
         Those that are estimated, by the name that rows have in common.
     index : ndarray of int (N,)
         Which of them each row has, in their order.
@@ -63,7 +63,7 @@ class Dependence:
     argument: str
     role: str
     given: FloatArray
-    sought: Mapping[str, Numbers]
+    estimated: Mapping[str, Numbers]
     index: IntArray
 
 
@@ -74,16 +74,16 @@ class Start:
     Attributes
     ----------
     slots : tuple of int
-        Which numbers of the argument are sought: a plane has one place and two turnings.
+        Which numbers of the argument are estimated: a plane has one place and two turnings.
     values : ndarray
         Their values.
-    along : int
+    axis : int
         Which axis of its own a line has, or is normal to a plane: 0, 1 or 2.
     """
 
     slots: tuple[int, ...]
     values: FloatArray
-    along: int = 0
+    axis: int = 0
 
 
 Found = dict[tuple[str, str], Start]  # by role and name
@@ -114,21 +114,21 @@ def always(
     scale : sequence of float, optional
         Of each number, as in `Numbers`; needed where its unit is none of the package's.
     """
-    sought = {}
+    estimated = {}
     for name in dict.fromkeys(names):
         start = starts[role, name]
         chosen = [numbers[slot] for slot in start.slots]
         whose = ".".join(filter(None, (role.partition(" ")[0], name)))
-        sought[name] = Numbers(
+        estimated[name] = Numbers(
             tuple(f"{whose}.{number}" for number, _ in chosen),
             tuple(unit for _, unit in chosen),
             np.array(start.slots, dtype=np.intp),
             start.values,
             None if scale is None else np.array([scale[slot] for slot in start.slots]),
         )
-    order = {name: i for i, name in enumerate(sought)}
+    order = {name: i for i, name in enumerate(estimated)}
     index = np.array([order[name] for name in names], dtype=np.intp)
-    return Dependence(argument, role, np.zeros((len(names), len(numbers))), sought, index)
+    return Dependence(argument, role, np.zeros((len(names), len(numbers))), estimated, index)
 
 
 def point(m: Any, argument: str, role: str, unknown: bool) -> Dependence:
@@ -138,14 +138,14 @@ def point(m: Any, argument: str, role: str, unknown: bool) -> Dependence:
         return Dependence(argument, role, given, {}, np.zeros(len(m), dtype=np.intp))
     places, index = points_of(role, m)
     units = tuple(unit for _, unit in POINT)
-    sought = {
+    estimated = {
         name: Numbers(
             tuple(f"{role}{name}.{axis}" for axis, _ in POINT), units, np.array(_WHOLE_POINT), place
         )
         for name, place in places.items()
     }
     given = np.array(list(places.values()))[index]  # which counts where they are held
-    return Dependence(argument, role, given, sought, index)
+    return Dependence(argument, role, given, estimated, index)
 
 
 def points_of(role: str, measured: Any) -> tuple[dict[str, FloatArray], IntArray]:

@@ -214,7 +214,7 @@ def _misfit(found: Identification) -> list[Contribution]:
                 remark="what the model misses beyond that" if missed else "not significant",
             ),
         ]
-    total = np.array([each.total for each in sure.noises])
+    total = np.array([each for each, _ in sure.noises])
     known = total[np.isfinite(total)]
     if not known.size:
         return []

@@ -53,24 +53,16 @@ def shared_error_score(fit: LinearFit) -> float:
     return float((together / variance - mean) / np.sqrt(spread))
 
 
-@dataclass(frozen=True, eq=False)
-class _Block:
-    """Clusters of the same size.
+# Clusters of the same size: their equations (g, m), what adjusts them, and what is retained of each
+_Block = tuple[IntArray, FloatArray, FloatArray]
 
-    Their equations (g, m), what adjusts them, and what is retained of each.
-    """
 
-    rows: IntArray
-    matrix: FloatArray
-    retained: FloatArray
-
-    def adjusted(self, values: FloatArray, design: FloatArray) -> FloatArray:
-        """Values (g, m, k) times (1 - H)^(-1/2)."""
-        if self.rows.shape[1] <= design.shape[1]:
-            return self.matrix @ values
-        part = design[self.rows]
-        along: FloatArray = self.matrix @ (part.transpose(0, 2, 1) @ values)
-        return values + part @ along
+def _adjusted(matrix: FloatArray, values: FloatArray, part: FloatArray) -> FloatArray:
+    """Values (g, m, k) of clusters whose part of the design is (g, m, p), times (1 - H)^(-1/2)."""
+    if part.shape[1] <= part.shape[2]:
+        return matrix @ values
+    found: FloatArray = values + part @ (matrix @ (part.transpose(0, 2, 1) @ values))
+    return found
 
 
 def _block(rows: IntArray, design: FloatArray) -> _Block:
@@ -85,7 +77,7 @@ def _block(rows: IntArray, design: FloatArray) -> _Block:
     else:  # 1 + A W Aᵀ, by the smaller AᵀA
         factor, spent = np.where(left, 1.0 / (root * (1.0 + root)), -1.0), part @ vectors
     matrix = (vectors * factor[:, None, :]) @ vectors.transpose(0, 2, 1)
-    return _Block(rows, matrix, 1.0 - (spent**2 @ ~left[:, :, None])[:, :, 0])
+    return rows, matrix, 1.0 - (spent**2 @ ~left[:, :, None])[:, :, 0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,17 +109,17 @@ class Sandwich:
         H is the cluster's block of the hat matrix. Residuals then have the variance of the errors.
         """
         out = np.empty_like(values)
-        for block in self._blocks():
-            out[block.rows] = block.adjusted(values[block.rows], self.fit.design)
+        for rows, matrix, _ in self._blocks():
+            out[rows] = _adjusted(matrix, values[rows], self.fit.design[rows])
         return out
 
     @cached_property
     def _residual(self) -> tuple[FloatArray, FloatArray]:
         left, kept = np.empty((2, len(self.fit.residual)))
-        for block in self._blocks():
-            mine = self.fit.residual[block.rows][:, :, None]
-            left[block.rows] = block.adjusted(mine, self.fit.design)[:, :, 0]
-            kept[block.rows] = block.retained
+        for rows, matrix, retained in self._blocks():
+            mine = self.fit.residual[rows][:, :, None]
+            left[rows] = _adjusted(matrix, mine, self.fit.design[rows])[:, :, 0]
+            kept[rows] = retained
         return left, kept
 
     @property
@@ -157,9 +149,9 @@ class Sandwich:
         """Degrees of freedom of the variances of contrasts (k, p) in `data`; 0 where none."""
         k, p = contrasts.shape
         every, trace, square, inner = np.zeros(k), np.zeros(k), np.zeros(k), np.zeros((k, p, p))
-        for block in self._blocks():
-            part = self.fit.design[block.rows]
-            alpha = block.adjusted(part @ contrasts.T, self.fit.design)
+        for rows, matrix, _ in self._blocks():
+            part = self.fit.design[rows]
+            alpha = _adjusted(matrix, part @ contrasts.T, part)
             own = (alpha**2).sum(axis=1)
             every += own.sum(axis=0)
             for i in range(k):

@@ -99,16 +99,16 @@ def holdout_test(
     ----------
     fitted, held : Lengths
         Rows that were fitted, and not.
-    split : Noise
-        Variances of the errors of both.
+    split : (float, float)
+        Variance of the errors of both, and what those of a pose share of it: see `noise`.
     covariance : ndarray (p, p)
         Of the parameters in the basis of the fit, in the unit of `held`.
-    of_held : Noise, optional
-        Variances of the errors of `held`, where they share another part of the same total.
+    of_held : (float, float), optional
+        That of `held`, where its errors share another part of the same variance.
     taken : float
         Share of the equations of `held` that numbers found from these took.
     """
-    expected = split.total + float(
+    expected = split[0] + float(
         np.einsum("ij,jk,ik->", held.design, covariance, held.design)
     ) / len(held.residual)
     ratio = float(np.sqrt(np.mean(held.residual**2) / expected))
@@ -121,7 +121,7 @@ def holdout_test(
         first = min(first, each * len(np.unique(held.pose)))
         left = 1.0 - fitted.design.shape[1] / len(fitted.residual)
         second = min(second, each * len(squares) * left)
-    usual = fitted.median * np.sqrt(expected / split.total)
+    usual = fitted.median * np.sqrt(expected / split[0])
     return HoldoutTest(ratio, held.median / usual, f_tail(ratio**2, first, second), (first, second))
 
 
@@ -131,12 +131,14 @@ def _of_sum(held: Lengths, split: Noise, covariance: FloatArray) -> float:
     counts = np.bincount(key).astype(np.float64)
     design, pulls = held.design, sums(held.design, key)
     inner, m = design.T @ design, len(held.residual)
-    mixed = split.single * inner + split.shared * (pulls.T @ pulls)
-    trace = m * split.total + float(np.trace(covariance @ inner))
+    total, shared = split
+    single = total - shared
+    mixed = single * inner + shared * (pulls.T @ pulls)
+    trace = m * total + float(np.trace(covariance @ inner))
     square = (
-        m * split.single**2
-        + 2.0 * split.single * split.shared * m
-        + split.shared**2 * float((counts**2).sum())
+        m * single**2
+        + 2.0 * single * shared * m
+        + shared**2 * float((counts**2).sum())
         + 2.0 * float(np.trace(covariance @ mixed))
         + float(np.trace(covariance @ inner @ covariance @ inner))
     )
@@ -149,14 +151,15 @@ def _of_residuals(fitted: Lengths, split: Noise) -> float:
     counts = np.bincount(key).astype(np.float64)
     design, pulls = fitted.design, sums(fitted.design, key)
     inner, of_keys = design.T @ design, pulls.T @ pulls
-    single, shared, m = split.single, split.shared, len(fitted.residual)
+    (total, shared), m = split, len(fitted.residual)
+    single = total - shared
     once = single * inner + shared * of_keys
     twice = (
         single**2 * inner
         + 2.0 * single * shared * of_keys
         + shared**2 * ((pulls * counts[:, None]).T @ pulls)
     )
-    trace = m * split.total - float(np.trace(once))
+    trace = m * total - float(np.trace(once))
     square = (
         m * single**2
         + 2.0 * single * shared * m

@@ -20,29 +20,14 @@ from pkmcal.statistics.linear_fit import sums
 SIGNIFICANT = 0.01  # chance below which the model is said to miss more than scatter explains
 
 
-@dataclass(frozen=True)
-class Noise:
-    """Variances of one equation.
-
-    Attributes
-    ----------
-    total : float
-        Mean square of adjusted residuals.
-    shared : float
-        What equations of one pose and component share of it: errors of the pose and of the model.
-    """
-
-    total: float
-    shared: float
-
-    @property
-    def single(self) -> float:
-        """Variance that is a reading's own."""
-        return self.total - self.shared
+Noise = tuple[float, float]  # variance of an equation, and what those of a pose share of it
 
 
 def noise(adjusted: FloatArray, retained: FloatArray, key: IntArray) -> Noise:
-    """Split the variance of residuals; NaN where the fit has used up all of them.
+    """Mean square of adjusted residuals, and what equations of one pose and component share of it.
+
+    That is errors of the pose and of the model; the rest is a reading's own. NaN where the fit has
+    used up all residuals.
 
     Parameters
     ----------
@@ -53,18 +38,17 @@ def noise(adjusted: FloatArray, retained: FloatArray, key: IntArray) -> Noise:
 
     Examples
     --------
-    >>> together = noise(np.array([1.0, 1.0, -1.0, -1.0]), np.ones(4), np.array([0, 0, 1, 1]))
-    >>> together.shared, together.single
-    (1.0, 0.0)
+    >>> noise(np.array([1.0, 1.0, -1.0, -1.0]), np.ones(4), np.array([0, 0, 1, 1]))
+    (1.0, 1.0)
     """
     shown = float(retained.sum())
     total = float((adjusted**2).sum()) / shown if shown > 0 else float("nan")
     counts = np.bincount(key)
     pairs = float((counts.astype(np.float64) ** 2 - counts).sum())
     if not (pairs and shown > 0):
-        return Noise(total, 0.0)
+        return total, 0.0
     cross = float((sums(adjusted, key) ** 2).sum() - (adjusted**2).sum())
-    return Noise(total, min(max(cross / pairs, 0.0), total))
+    return total, min(max(cross / pairs, 0.0), total)
 
 
 @dataclass(frozen=True)

@@ -9,28 +9,9 @@ The American Statistician 42 (1988)). The design stays unweighted.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
-
-
-@dataclass(frozen=True, eq=False)
-class PseudoResiduals:
-    """See the module.
-
-    Attributes
-    ----------
-    residual : ndarray (M,)
-        r*, whitened.
-    slope, correction : float
-        δ and K; 1 where no row is down-weighted.
-    """
-
-    residual: FloatArray
-    slope: float
-    correction: float
 
 
 def pseudo_residuals(
@@ -39,7 +20,7 @@ def pseudo_residuals(
     weights: FloatArray,
     decline: FloatArray,
     parameters: int,
-) -> PseudoResiduals:
+) -> tuple[FloatArray, float, float]:
     """Compute them.
 
     Parameters
@@ -52,10 +33,17 @@ def pseudo_residuals(
         w of each row and s ∂w/∂s, s the length of its residual.
     parameters : int
         How many were fitted.
+
+    Returns
+    -------
+    residual : ndarray (M,)
+        r*, whitened.
+    slope, correction : float
+        δ and K; 1 where no row is down-weighted.
     """
     slopes = weights + decline / components
     slope = float(np.average(slopes, weights=components))
     spread = float(np.average((slopes - slope) ** 2, weights=components))
     correction = 1.0 + parameters / len(residual) * spread / slope**2
     factor = np.repeat(correction * weights / slope, components)
-    return PseudoResiduals(factor * residual, slope, correction)
+    return factor * residual, slope, correction

@@ -67,7 +67,7 @@ def test_a_target_is_far_beyond_thrice_the_largest_of_reach_size_and_geometry(wh
     ):
         chosen: Any = SimpleNamespace(
             robot=robot,
-            found_along={("anchor", "9"): 0, ("target", "west"): 1, ("attachment", "2"): 2},
+            nuisance={("anchor", "9"): 0, ("target", "west"): 1, ("attachment", "2"): 2},
             number_of=np.array([0, -1, -1, 1, -1, -1, 2, -1, -1]),
             names=["anchor9.x", "", "", "targetwest.x@one", "", "", "attachment2.x", "", ""],
             start=np.array([0.0, 0, 0, 0, 0, stated, 0, 0, 0]),

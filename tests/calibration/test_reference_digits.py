@@ -10,6 +10,7 @@ import pytest
 
 import pkmcal as pk
 from pkmcal.measurements.measurements import Measurements
+from pkmcal.statistics.pseudo_residuals import pseudo_residuals
 
 from ..statistics.designs import UNKNOWN, seen_by_tracker, six_joints
 
@@ -91,4 +92,8 @@ def test_of_a_hexapod_with_repeats_and_a_holdout(seed: int, loss: str) -> None:
     for number, digit in zip(numbers[1:], digits[1:8], strict=True):
         assert like(float(number), digit)
     if loss == "cauchy":
-        assert like(found.fit.uncertainty.pseudo.slope, digits[9])
+        equations, estimate = found.fit.uncertainty.equations, found.fit.estimate
+        decline = estimate.state.loss.decline(estimate.residual)
+        given = estimate.residual, equations.components, estimate.weights, decline
+        _, slope, _ = pseudo_residuals(*given, estimate.state.determined.rank)
+        assert like(slope, digits[9])

@@ -146,7 +146,7 @@ def test_it_stands_beside_expansion(machine: tuple[pk.Robot, pk.Robot, FloatArra
     robot, true, q = machine
     alone = measured(true, q, 0)
     warm = replace(alone, temperature=np.full(len(q), 20.0))
-    found = pk.identify(robot, warm, free="offset*", effects=[Sinking()], expansion=11.5e-6)
+    found = pk.identify(robot, warm, free="offset*", effects=[Sinking(), pk.Expansion(11.5e-6)])
     without = pk.identify(robot, alone, free="offset*", effects=[Sinking()])
     np.testing.assert_allclose(found.values, without.values, atol=1e-9)
     assert set(found.expansion.values()) == {11.5e-6}

@@ -39,7 +39,7 @@ def in_small_lots(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(module, name, together)
 
 
-@pytest.mark.parametrize("options", [{}, {"loss": "huber"}, {"uncertainty": "cluster"}])
+@pytest.mark.parametrize("options", [{}, {"loss": "huber"}, {"covariance": "cluster"}])
 def test_a_calibration_in_lots_is_that_made_at_once(
     hexapod: pk.Robot, options: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:

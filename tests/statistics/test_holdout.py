@@ -51,7 +51,7 @@ def compared(
     fit, _ = part.fitted(y[mine])
     sandwich = Sandwich(fit)
     of_noise = noise(sandwich.residual, sandwich.retained, fit.key)
-    unit = np.sqrt(of_noise.total)
+    unit = np.sqrt(of_noise[0])
     left = factor * (y[rest] - outside @ (fit.design.T @ y[mine]))
     test = holdout_test(
         Lengths(sandwich.residual / unit, fit.design, part.row, fit.cluster, fit.component),
@@ -62,7 +62,7 @@ def compared(
         noise(sandwich.residual / unit, sandwich.retained, fit.key),
         sandwich.data,
     )  # fmt: skip
-    expected = of_noise.total + np.einsum("ij,jk,ik->", outside, sandwich.data, outside) / len(rest)
+    expected = of_noise[0] + np.einsum("ij,jk,ik->", outside, sandwich.data, outside) / len(rest)
     return test, float(np.mean(left**2)), float(expected)
 
 

@@ -40,7 +40,7 @@ def robust_fit(design: Design, y: FloatArray, name: LossName) -> tuple[LinearFit
                 break
     r = y - fit.design @ b
     if name != "linear":
-        r = pseudo_residuals(r, components, loss.weights(r), loss.decline(r), p).residual
+        r = pseudo_residuals(r, components, loss.weights(r), loss.decline(r), p)[0]
     return replace(fit, residual=r), design.contrasts @ b
 
 
