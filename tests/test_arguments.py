@@ -20,6 +20,7 @@ POSES = ROBOT.home + [[20.0 * i, 5.0 * i**2, 0, 0, 0, 0] for i in range(8)]
 Q = ROBOT.inverse(POSES)
 MEASURED = pk.Measurements(Q, POSES, "pose", sigma=0.01)
 FOUND = pk.identify(ROBOT, MEASURED, free="offset*")
+YIELDING = ROBOT.yielding({"offset*": 1 / 20e3})
 THETA = np.full((2, 3), 0.1)
 TARGETS = ARM.forward(THETA)
 AWAY = FLAT.home + np.array([0, 10, 0, 0, 0, 0])
@@ -177,6 +178,21 @@ CALLS: dict[str, Call] = {
         {"path": "arm.toml", "comment": "# of a test"},
         {"path": "path", "comment": "comment"},
     ),
+    "Load": (
+        pk.Load,
+        {"mass": 1.0, "centre": np.zeros(3), "force": np.ones(3), "moment": np.ones(3)},
+        {"mass": "numbers", "centre": "numbers", "force": "numbers", "moment": "numbers"},
+    ),
+    "stiffness": (
+        pk.stiffness,
+        {"robot": YIELDING, "poses": POSES, "at": np.zeros(3)},
+        {"robot": "parallel", "poses": "numbers", "at": "numbers"},
+    ),
+    "compliance_table": (
+        pk.compliance_table,
+        {"robot": YIELDING, "pose": POSES[0], "rated": 500.0},
+        {"robot": "parallel", "pose": "numbers", "rated": "positive"},
+    ),
     "sensitivity": (
         pk.sensitivity,
         {"robot": ROBOT, "poses": POSES, "step": 1.0, "cases": "offset*"},
@@ -226,7 +242,6 @@ CALLS: dict[str, Call] = {
             "kind": "word",
             "sigma": "numbers",
             "target": "numbers",
-            "group": "numbers",
             "target_index": "numbers",
             "actuator_units": "names",
         },
@@ -298,7 +313,7 @@ CALLS: dict[str, Call] = {
             "prior": "one or by name",
             "loss": "word",
             "unknown": "names",
-            "uncertainty": "word",
+            "covariance": "word",
             "holdout": "positive",
             "bounds": "by name",
         },
@@ -547,8 +562,10 @@ def test_every_public_call_is_among_them() -> None:
         ),
         *("Geometry", "GeometryCheck", "Identification", "Move", "MoveSample", "Plan"),
         *(
+            "ComplianceTable",
             "DHTable",
             "Distances",
+            "Stiffness",
             "Moved",
             "Sensitivity",
             "Verdict",

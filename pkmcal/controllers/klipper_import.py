@@ -23,6 +23,7 @@ from pkmcal.controllers.rotary_delta import RotaryDelta, elbow_at
 from pkmcal.controllers.stored import Stored
 from pkmcal.geometry.controller import Controller
 from pkmcal.measurements.measurements import Measurements
+from pkmcal.readings.distances import Between
 
 _LINEAR_HEAD = """\
 # Imported from {file} by pkmcal: the firmware's numbers of a linear delta.
@@ -160,4 +161,4 @@ def _distances(printer: PrinterConfig) -> Measurements | None:
         [printer.numbers(_CALIBRATE, f"{name}_pos{end}", 3) for name in names] for end in (1, 2)
     )
     values = [printer.number(_CALIBRATE, name) for name in names]
-    return Measurements(first, values, "between", other=then)
+    return Measurements(first, values, Between(then))

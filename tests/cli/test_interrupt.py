@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
@@ -93,8 +94,8 @@ def test_interrupt_while_a_file_is_written_leaves_the_old_one(
 ) -> None:
     (tmp_path / "robot.toml").write_text("old")
 
-    def stopped(path: Path, content: bytes) -> None:
-        path.write_bytes(content[:3])
+    def stopped(path: Path, pieces: Iterable[bytes]) -> None:
+        path.write_bytes(b"".join(pieces)[:3])
         raise KeyboardInterrupt
 
     monkeypatch.setattr(atomic, "_write", stopped)

@@ -183,8 +183,8 @@ def test_a_tracker_that_is_none_is_named(text: str, words: str) -> None:
 def test_calibrate_finds_where_wires_end(run: Any, tmp_path: Path) -> None:
     robot = pk.load("hexapod")
     q = robot.inverse(hexapod_poses(robot, 40, np.random.default_rng(1)))
-    wire = {"target": [400, 300, -100], "attachment": [60, 20, 0]}
-    measured = pk.VirtualMachine(robot, 0.01).measure(q, "distance", **wire)
+    wire = pk.readings.Distance(attachment=[60, 20, 0])
+    measured = pk.VirtualMachine(robot, 0.01).measure(q, wire, target=[400, 300, -100])
     measured.write("wire.csv")
     options = ["--free", "offset2", "--attachment", "unknown", "--json"]
     found = json.loads(run("calibrate", "hexapod", "wire.csv", *options).stdout)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -88,12 +87,13 @@ def readings(kind: str) -> Identification:
     q = robot.inverse(hexapod_poses(robot, 40, np.random.default_rng(0)))
     other = robot.inverse(hexapod_poses(robot, 40, np.random.default_rng(1)))
     machine = pk.VirtualMachine(robot, noise=0.01)
-    more: dict[str, dict[str, Any]] = {
-        "distance": {"target": ANCHOR},
-        "relative-distance": {"target": ANCHOR, "run": ["A"] * len(q)},
-        "between": {"target": tip, "other": other},
+    known = {
+        "relative-distance": pk.readings.RelativeDistance(run=["A"] * len(q)),
+        "between": pk.readings.Between(other),
     }
-    return pk.identify(robot, machine.measure(q, kind, **more.get(kind, {})), free="offset*")
+    target = {"distance": ANCHOR, "relative-distance": ANCHOR, "between": tip}.get(kind)
+    measured = machine.measure(q, known.get(kind, kind), target=target)
+    return pk.identify(robot, measured, free="offset*")
 
 
 @pytest.mark.parametrize("kind", [
