@@ -56,6 +56,8 @@ _KEYS = {
     "rod": "length from carriage or crank to the platform joint",
     "offset, gain": "the drive is at gain · q + offset; 0 and 1 if left out",
     "branch": "which of the two places that a rod can lead to: 1 or -1",
+    "stiffness, rod_stiffness": "N/mm of the leg or the screw, N m/rad of the crank; of the rod",
+    "mass, anchor_mass": "kg: of leg or rod, half of it at each end; of the carriage",
     "drive": "law of a drive with a shape: quadratic, spool, harmonics, table, backlash",
     "stroke": "least and most of gain · q + offset",
     "base_cone": "{{ axis = …, angle = … }}: how far its joint on the base swings",

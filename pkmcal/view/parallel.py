@@ -39,12 +39,13 @@ def data(robot: Robot, cloud: bool) -> dict[str, Any]:
 
     With `cloud` the positions of good poses too, which take a while to find.
     """
-    said, robot = words.of_robot(robot) + words.of_yielding(robot), robot.rigid
+    given, robot = robot, robot.rigid
     model = robot.model
     machine, slots = drives.within(robot)
     laws = drives.laws(robot)
     if what := beyond(model):
         raise ArgumentError(f"robot: {model.name} has {what}, which the page cannot hold")
+    said = words.of_robot(given) + words.of_yielding(given)
     size = float(machine.struct.size)
     if isinstance(machine, Machine):
         blob, numbers, strokes = memory.limbs(machine, slots), 0, _strokes(robot)

@@ -6,6 +6,7 @@ import json
 import math
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -66,7 +67,7 @@ def test_help_shows_an_example_that_runs(run: Any, verb: str, tmp_path: Path) ->
     words = " ".join(run(verb, "--help").stdout.split())
     match = re.search(r"Example: (pkmcal .*?) [╭+]", words)
     assert match
-    command, *arguments = match[1].split()
+    command, *arguments = shlex.split(match[1])
     assert (command, arguments[0]) == ("pkmcal", verb)
     assert run(*arguments).exit_code == 0
 

@@ -6,6 +6,7 @@ import csv
 import hashlib
 import json
 import re
+import shlex
 from pathlib import Path
 from typing import Any
 
@@ -40,7 +41,7 @@ def test_help_shows_an_example_that_runs(run: Any, verb: str) -> None:
     words = " ".join(run(verb, "--help").stdout.split())
     match = re.search(r"Example: (pkmcal .*?) [╭+]", words)
     assert match
-    command, *arguments = match[1].split()
+    command, *arguments = shlex.split(match[1])
     assert (command, arguments[0]) == ("pkmcal", verb)
     assert run(*arguments).exit_code == 0
 

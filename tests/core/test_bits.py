@@ -114,6 +114,28 @@ def spheres(isa: int, part: slice) -> list[np.ndarray]:
     return found
 
 
+def forward_loaded(isa: int, part: slice) -> list[np.ndarray]:
+    """Of legs that give under a load, far enough that some rows want several steps."""
+    robot = pk.load("hexapod").yielding({"offset*": 1 / 300.0})
+    robot.machine.inner.isa = isa
+    away = np.random.default_rng(25).uniform(-1, 1, (ROWS, 6)) * [100, 100, 100, 0.2, 0.2, 0.2]
+    q = robot.rigid.inverse(robot.home + away)
+    found = robot.forward(q[part], load=pk.Load(60.0, [5.0, 0.0, 90.0]))
+    assert found.ok.all()
+    return [found.pose, found.residual]
+
+
+def work_at_anchors(isa: int, part: slice, name: str) -> list[np.ndarray]:
+    """By the actuators' places and the numbers of limbs whose anchors move."""
+    robot, draw = pk.load(name), np.random.default_rng(26)
+    robot.machine.isa = isa
+    q = robot.inverse(robot.home) + draw.uniform(-0.3, 0.3, (ROWS, robot.n_actuators))
+    force = draw.normal(size=(ROWS, robot.machine.struct.limbs, 3))
+    columns = robot.geometry.slot_index[::2].astype(np.int32)
+    given = (q[part].copy(), force[part].copy(), columns)
+    return [robot.machine.work_at_anchors(robot.slots, *given)]
+
+
 def actuators_as_instruments(isa: int, part: slice, call: str) -> list[np.ndarray]:
     """Of cranks, and of legs with rows beside the sphere's; far poses, which some do not reach."""
     found = []
@@ -223,6 +245,9 @@ CASES: dict[str, Case] = {
     "tpr2tps_jacobian": lambda isa, part: closed_forms(isa, part, tpr2tps_jacobian, (4, 4)),
     "closure_cost": closure_cost,
     "spheres": spheres,
+    "forward_loaded": forward_loaded,
+    "slider_work": lambda isa, part: work_at_anchors(isa, part, "linear-delta"),
+    "crank_work": lambda isa, part: work_at_anchors(isa, part, "rotary-delta"),
     "pose_normals": lambda isa, part: poses_of_equations(isa, part, "pose_normals"),
     "pose_fit": lambda isa, part: poses_of_equations(isa, part, "pose_fit"),
     "pose_left": lambda isa, part: poses_of_equations(isa, part, "pose_left"),

@@ -253,7 +253,10 @@ static void of_machine(ptrdiff_t n, unsigned strange, int isas)
     }
     const pkm_machine *is = &machine;
     const int twists = byte() & 1;
-    one_of(14);
+    const double *gives = numbers(8, strange), *pulls = numbers(16, strange);
+    const double *rest = numbers(8, strange), *most = numbers(8, strange);
+    const int steps = (int)(byte() % 20);
+    one_of(15);
 
     EACH_ISA(inverse, is, n, geometry, stride, pose, near, about, D(0, n * q));
     EACH_ISA(forward, is, n, geometry, stride, drives, guess, some, D(0, 6 * n), I(1, n), I(2, n),
@@ -262,6 +265,8 @@ static void of_machine(ptrdiff_t n, unsigned strange, int isas)
         EACH_ISA(forward_machines, is, n, geometry, 2, places, starts, D(0, 12 * n), I(1, 2 * n),
                  I(2, 2 * n), D(3, 2 * n));
     }
+    EACH_ISA(forward_loaded, is, n, geometry, drives, guess, some, column, 8, gives, 0, pulls, 0, rest,
+             most, steps, D(0, 6 * n), I(1, n), I(2, n), D(3, n));
     EACH_ISA(jacobian, is, n, geometry, stride, pose, D(0, n * q * m));
     EACH_ISA(forward_jacobian, is, n, geometry, stride, pose, drives, twists, D(0, 6 * n * q));
     EACH_ISA(error_jacobian, is, n, geometry, stride, pose, drives, column, 8, twists,
@@ -368,7 +373,9 @@ static void of_rows(ptrdiff_t n, unsigned strange, int isas)
     const double *a = numbers(6 * n + 6, strange), *b = numbers(6 * n + 6, strange);
     const double *c = numbers(6 * n + 6, strange), *motion = numbers(16 * n + 9, strange);
     const ptrdiff_t six = byte() & 1 ? 6 : 0, three = byte() & 1 ? 3 : 0;
-    one_of(28);
+    one_of(30);
+    EACH_ISA(slider_work, n, a, motion, 0, b, motion, D(0, n), D(1, 16 * n));
+    EACH_ISA(crank_work, n, a, motion, 0, b, motion, D(0, n), D(1, 16 * n));
     EACH_ISA(compose, n, a, six, b, 6 - six, D(0, 6 * n));
     EACH_ISA(invert, n, a, D(0, 6 * n));
     EACH_ISA(compose_rates, n, a, b, c, six, a, D(0, 36 * n));
