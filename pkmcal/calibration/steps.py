@@ -13,6 +13,8 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+import numpy as np
+
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import IntArray
 from pkmcal.calibration.identification import Identification
@@ -154,7 +156,22 @@ def begin(rows: Rows, chosen: Parameters) -> Problem:
     problem = Problem(*begun(rows.fitted, chosen, rows.missing))
     if rows.held and problem.equations.closures.cells:
         raise ArgumentError("holdout: rows whose tensions are unknown are all fitted: leave it out")
+    _require_predictions(problem)
     return problem
+
+
+def _require_predictions(problem: Problem) -> None:
+    """Refuse a reading, or an effect, that gives no number where the machine is known to be."""
+    table, start = problem.exact.table, problem.start
+    for m, place, predicted in zip(table.sets, table.pose_of, start.predicted, strict=True):
+        read = np.isfinite(m.values.reshape(predicted.shape))
+        silent = (read & ~np.isfinite(predicted)).any(axis=1) & (start.status[place] == 0)
+        if silent.any():
+            raise ArgumentError(
+                f"measurements: {m.kind}: nothing finite is predicted of row"
+                f" {int(np.argmax(silent))} of its set, though the machine's pose is known there:"
+                " its reading, or an effect, gives NaN"
+            )
 
 
 def without_outliers(rows: Rows, problem: Problem, chosen: Parameters) -> tuple[Rows, Problem]:

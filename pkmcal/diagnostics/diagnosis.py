@@ -87,6 +87,9 @@ def verified(checks: Sequence[Check[Any]]) -> tuple[Check[Any], ...]:
             raise ValueError(f"{check.name}: two checks have this name")
         if unknown := sorted(set(check.unless) - {*names, *_LEVELS}):
             raise ValueError(f"{check.name}: unless names no check: {', '.join(unknown)}")
+        if strange := sorted(set(check.levels) - {*_LEVELS}):
+            known = ", ".join(_LEVELS)
+            raise ValueError(f"{check.name}: levels are of {known}; found {', '.join(strange)}")
         if not check.levels or (len(check.levels) > 1 and check.level_of is None):
             raise ValueError(f"{check.name}: level_of must say which of {check.levels} it is")
         before = [one for other in check.unless for one in meant(checks, check, other)]

@@ -27,6 +27,8 @@ def measured(hexapod: pk.Robot) -> pk.Measurements:
      r"write unknown=\['frame', 'target'\]"),
     ({"frame": ["unknown"], "target": "known"}, {"unknown": {"frame": ["unknown"]}},
      r"write unknown={'frame': \['unknown'\]}"),
+    ({"frame": "unknown", "unknown": "target"}, {"unknown": ["frame", "target"]},
+     "write unknown="),
     ({"frame": "known", "slack": "keep", "datum": "none"}, {}, "leave it out"),
     ({"datum": "auto", "fix": "offset2"}, {"fix": ["offset2", "datum"]},
      r"write fix=\['offset2', 'datum'\]"),

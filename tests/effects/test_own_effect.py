@@ -167,3 +167,23 @@ def test_arguments_of_one_name_are_refused(
     robot, true, q = machine
     with pytest.raises(ValueError, match="effects: several arguments are called 'target'"):
         pk.identify(robot, measured(true, q, 0), effects=[Sinking(argument="target")])
+
+
+def test_an_effect_that_gives_no_number_is_refused(
+    machine: tuple[pk.Robot, pk.Robot, FloatArray],
+) -> None:
+    class Lost(Sinking):
+        def of_rows(self, measured: Any) -> Any:
+            return Rows(super().of_rows(measured))
+
+    class Rows:
+        def __init__(self, inner: Any) -> None:
+            self.inner = inner
+
+        def moved(self, *given: Any) -> Moved:
+            found: Moved = self.inner.moved(*given)
+            return found._replace(twist=np.full_like(found.twist, np.nan))
+
+    robot, true, q = machine
+    with pytest.raises(pk.ArgumentError, match=r"position: nothing finite .* row 0"):
+        pk.identify(robot, measured(true, q, 1), free="offset*", effects=[Lost()])
