@@ -57,7 +57,8 @@ def now(before: dict[str, Any], others: dict[str, Any]) -> dict[str, Any]:
     roles = {role: before[role] for role in ROLES if before.get(role, "known") != "known"}
     if roles:
         stated = unknown_roles(others.get("unknown", ()))
-        roles = {role: given for role, given in stated.items() if given != "known"} | roles
+        roles = {role: roles.get(role, stated[role]) for role in ROLES}
+        roles = {role: given for role, given in roles.items() if given != "known"}
         alone = all(given == "unknown" for given in roles.values())
         new["unknown"] = roles if not alone else [*roles] if len(roles) > 1 else next(iter(roles))
     if word("datum", before.get("datum", "none"), ("none", "auto")) == "auto":

@@ -17,6 +17,7 @@ from pkmcal.compensation.gcode_line import Command, Unclear, Word, commands
 from pkmcal.exceptions import ArgumentError, FileError
 from pkmcal.files.text_lines import MARK
 
+_HOMING = "homing"  # what messages call it
 _INCH = 25.4
 
 
@@ -130,7 +131,7 @@ class Program:
     letters : sequence of str
         The axes that it moves, such as ``"XYZ"``.
     start : ndarray (axes,)
-        Where they are at first and after homing, mm and deg.
+        Where they are at first, and their angles after homing, mm and deg.
     stated : bool
         Whether that is known of the lengths; else a program has to begin with all of them.
     passed : collection of str
@@ -187,14 +188,16 @@ class Program:
         FileError
             What cannot be followed, with its line: arcs, cycles, offsets, parameters.
         """
-        state = _State(self._start, set())
-        self._home(state)
+        known = {each for each in self._letters if self._stated or each in "ABC"}
+        state = _State(self._start, known)
         marked: bool | None = None  # whether the program begins with %
         marks, end, ending = 0, "", "\n"
         lines = io.TextIOWrapper(
             io.BytesIO(self._content), "utf-8", errors="surrogateescape", newline=""
         )
         for i, line in enumerate(lines):
+            if line.endswith("\r") and self.dialect.newlines:
+                raise self.wrong(i, f"{self.dialect.title} ends no line at a carriage return alone")
             code = line.rstrip("\r\n")
             code = code.replace(MARK, " ", 1) if i == 0 else code
             marked = code.strip() == "%" if marked is None and code.strip() else marked
@@ -222,8 +225,14 @@ class Program:
 
     def _line(self, i: int, line: str, code: str, state: _State) -> tuple[str, Move | None]:
         """A line as it is to be written, and its move."""
-        moves = []
-        for command in commands(code, self.dialect):
+        moves, found = [], list(commands(code, self.dialect))
+        scales = {"G20": _INCH, "G21": 1.0}
+        changes = any(scales.get(each.name, state.scale) != state.scale for each in found)
+        if self.dialect.block and changes and any("F" in (each.words or {}) for each in found):
+            raise Unclear(
+                "F beside a change of units is of those before: give it a line of its own"
+            )
+        for command in found:
             meaning = self._meaning(command)
             if meaning is Meaning.HOMES:
                 self._home(state)
@@ -268,9 +277,9 @@ class Program:
         return meaning or Meaning.MOVES
 
     def _home(self, state: _State) -> None:
-        """The machine is where it was at first: angles as at home, lengths if they are stated."""
-        state.at, state.fresh, state.lost_by = self._start, True, ""
-        state.known = {each for each in self._letters if self._stated or each in "ABC"}
+        """Angles are as at first; where homing ends is in the controller's configuration."""
+        state.at, state.fresh, state.lost_by = self._start, True, _HOMING
+        state.known = {each for each in self._letters if each in "ABC"}
 
     @staticmethod
     def _mode(command: Command, state: _State) -> None:
@@ -359,7 +368,7 @@ class Program:
             where = f"where {' and '.join(unknown)} is, is not known here"
             if state.lost_by:
                 passed = f"; if it moves nothing and changes no mode: --pass {state.lost_by}"
-                unless = "" if state.lost_by in self._passed else passed
+                unless = "" if {state.lost_by} & {_HOMING, *self._passed} else passed
                 raise Unclear(f"{where}, behind {state.lost_by}: name all axes{unless}")
             raise Unclear(
                 f"{where}: state the pose at the start, or let the first move name X, Y and Z"

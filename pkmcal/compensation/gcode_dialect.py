@@ -65,6 +65,8 @@ class Dialect:
         Whether a line may have several commands, one after the other; else the first alone counts.
     block : bool
         Whether the words of a line act together, in an order of their own.
+    newlines : bool
+        Whether a carriage return alone ends no line.
     behind : frozenset of str
         Words of a block that act behind its move.
     offsets : dict
@@ -89,6 +91,7 @@ class Dialect:
     remark: str = r";.*"
     several: bool = False
     block: bool = False
+    newlines: bool = False
     behind: frozenset[str] = frozenset()
     offsets: dict[str, frozenset[str]] = field(default_factory=lambda: {"G10": _OF_OFFSETS})
     extrusion: tuple[Rule, ...] = ()

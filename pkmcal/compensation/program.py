@@ -115,8 +115,8 @@ def compensate_program(
         Write actuator coordinates in place of poses, as X Y Z A B C in the order of the actuators,
         mm and deg, for a LinuxCNC without kinematics; feed as inverse time, G93.
     start : array_like (6,), optional
-        The controller's pose when the program starts, and after homing, mm and rad. By default the
-        first move has to name X, Y and Z; angles begin with those of home.
+        The controller's pose when the program starts, mm and rad. By default the first move has to
+        name X, Y and Z, as has the first behind homing; angles begin with those of home.
     passed : sequence of str
         Macros and other words, such as ``"PARK"``, that move nothing and change no mode; or
         refused words, such as ``"M420"``, that here do not what they are refused for: the next move

@@ -11,6 +11,7 @@ KLIPPER = Dialect(
     letters=frozenset("EF"),
     extrusion=("either",),
     exact=True,
+    newlines=True,
     texts=frozenset({"M23", "M28", "M32", "M117", "M118", "ECHO", "RESPOND", "SET_DISPLAY_TEXT"}),
     words=table(
         followed="G0 G1 G21 G90 G91 G92 M82 M83",

@@ -8,6 +8,7 @@ from pkmcal.compensation.gcode_dialect import Dialect, table
 LINUXCNC = Dialect(
     title="LinuxCNC",
     block=True,
+    newlines=True,
     behind=frozenset({"M0", "M1", "M2", "M30", "M60"}),
     remark=r"\([^()]*\)|;.*",
     letters=frozenset("FS"),

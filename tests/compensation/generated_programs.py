@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import random
 
-LINE_ENDS = ("\n", "\r\n", "\r")
 HARMLESS = {
     "linuxcnc": """
         G4 P0.1 | M3 S200 | M5 | M8 | G64 P0.01 | G17 G40 G49 | (note X5) | ; G1 X9 | G91.1 |
@@ -157,7 +156,9 @@ def program(firmware: str, rng: random.Random, odd: int = 0, joints: bool = Fals
         if rng.random() < 0.4:
             lines = ["%", *rng.choice([[], ["O1000"], ["(PART 7)"]]), *lines, "%"]
             lines += rng.choice([[], ["G1 X9 Y9"]])
-    end = rng.choice(LINE_ENDS)
+    end = rng.choice(
+        ["\n", "\r\n"] if firmware in ("linuxcnc", "klipper") else ["\n", "\r\n", "\r"]
+    )
     return rng.choice(["", "", "\ufeff"]) + end.join(lines) + rng.choice(["", end])
 
 

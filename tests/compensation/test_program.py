@@ -233,14 +233,28 @@ def test_joint_moves_are_actuators_in_the_time_that_the_feed_gives(tmp_path: Pat
         corrected(tmp_path, "G0 X1 Y1 Z9", joints=True, firmware="marlin")
 
 
-def test_after_homing_the_pose_is_as_stated_or_has_to_be_named(tmp_path: Path) -> None:
-    text = "G28\nG1 Z20 F600\nG1 X5\nG28\nG1 X5 Y5 Z20\n"
-    with pytest.raises(pk.FileError, match="line 2: where X and Y is, is not known"):
-        corrected(tmp_path, text)
-    start = np.array([0, 0, 235.0, 0, 0, 0])
-    found = corrected(tmp_path, text, start=start, chord=100.0).text.splitlines()
-    assert found[1].count("X") == found[1].count("Y") == 1  # the controller stands at the middle
+def test_behind_homing_the_first_move_names_all_lengths(tmp_path: Path) -> None:
+    """Where homing ends is in the controller's configuration, and not where the program began."""
+    for start in (None, [0, 0, 235.0, 0, 0, 0]):
+        for text in ("G28\nG1 X5 F600\n", "G28\nG91\nG1 Z5 F600\n"):
+            with pytest.raises(pk.FileError, match="is not known here, behind homing"):
+                corrected(tmp_path, text, start=start)
     assert corrected(tmp_path, "G28\nG1 X1 Y2 Z3\n").moves == 1
+    found = corrected(tmp_path, "G1 X5 F600\n", start=[0, 0, 235.0, 0, 0, 0]).text
+    assert found.count("X") == found.count("Y") == 1  # the controller stands at the middle
+
+
+def test_feed_beside_a_change_of_units_is_refused(tmp_path: Path) -> None:
+    """LinuxCNC takes F before G20 and G21, in the units before the block."""
+    with pytest.raises(pk.FileError, match="line 2: F beside a change of units"):
+        corrected(tmp_path, "G0 X0 Y0 Z200\nG20 F10\nG21\nG1 X1\n", firmware="linuxcnc")
+    assert corrected(tmp_path, "G21 G90 G94 F100\nG1 X0 Y0 Z200\n", firmware="linuxcnc").moves == 1
+
+
+@pytest.mark.parametrize("firmware", ["linuxcnc", "klipper"])
+def test_a_carriage_return_alone_ends_no_line(firmware: str, tmp_path: Path) -> None:
+    with pytest.raises(pk.FileError, match="line 2: .* ends no line at a carriage return alone"):
+        corrected(tmp_path, "G1 X0 Y0 Z200 F600\n; note\rG1 X5\n", firmware=firmware)
 
 
 ORIGIN = "moves the origin, or skews or scales axes"
@@ -355,7 +369,7 @@ def test_where_e_is_has_to_be_known_of_a_move_in_parts(tmp_path: Path) -> None:
         corrected(tmp_path, mixed, firmware="reprap")  # its versions differ
 
 
-@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
 def test_joint_moves_state_their_times_wherever_a_program_sets_modes(
     end: str, tmp_path: Path
 ) -> None:
