@@ -253,7 +253,7 @@ def test_feed_beside_a_change_of_units_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("firmware", ["linuxcnc", "klipper"])
 def test_a_carriage_return_alone_ends_no_line(firmware: str, tmp_path: Path) -> None:
-    with pytest.raises(pk.FileError, match="line 2: .* ends no line at a carriage return alone"):
+    with pytest.raises(pk.FileError, match=r"line 2: .* ends no line at a carriage return alone"):
         corrected(tmp_path, "G1 X0 Y0 Z200 F600\n; note\rG1 X5\n", firmware=firmware)
 
 
