@@ -209,7 +209,7 @@ def _lots(rows: IntArray) -> list[IntArray]:
 
 
 def _driven(robot: Calibratable, state: DriveState) -> Calibratable:
-    return state.of(robot) if isinstance(robot, Robot) else robot
+    return state.of(robot)
 
 
 def exact_closures(rows: Sequence[IntArray], read: FloatArray) -> SessionClosures:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.kinematics.calibratable import ArmMachine
 from pkmcal.kinematics.robot import Robot
+
+M = TypeVar("M")
 
 
 class DriveState(NamedTuple):
@@ -28,8 +31,13 @@ class DriveState(NamedTuple):
         """That of some rows, or of one."""
         return DriveState(*(None if each is None else each[rows] for each in self))
 
-    def of(self, robot: Robot) -> Robot:
-        """The robot in this state."""
+    def of(self, machine: M) -> M:
+        """The machine in this state: a robot, or an arm, on which tension does nothing."""
+        if isinstance(machine, ArmMachine):
+            known = self.approach is not None
+            return machine.approaching(self.approach) if known else machine  # type: ignore
+        if not isinstance(machine, Robot):
+            return machine
         if self.approach is not None:
-            robot = robot.approaching(self.approach)
-        return robot if self.tension is None else robot.tensioned(self.tension)
+            machine = machine.approaching(self.approach)
+        return machine if self.tension is None else machine.tensioned(self.tension)

@@ -168,8 +168,7 @@ class _Solving:
     state: DriveState
 
     def __call__(self, actuators: FloatArray, argument: str) -> Any:
-        moved = self.state.of(self.machine) if isinstance(self.machine, Robot) else self.machine
-        solved = moved.forward(actuators)
+        solved = self.state.of(self.machine).forward(actuators)
         failed = np.flatnonzero(~np.asarray(solved.ok)).tolist()
         if failed:
             raise ArgumentError(
