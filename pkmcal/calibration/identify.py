@@ -168,6 +168,16 @@ def identify(
     machine = as_machine(robot)
     roles, own = unknown_roles(unknown), words("per_session", per_session)
     fixed, find_datum = fixed_names(fix)
+    if isinstance(effects, str):
+        word("effects", effects, ("auto",))
+        found = identify(
+            robot, measurements, free, prior=prior, loss=loss, unknown=unknown, holdout=holdout,
+            bounds=bounds, covariance=covariance, per_session=per_session, fix=fix, drop=drop,
+        )  # fmt: skip
+        helps = sag_that_helps(found.fit)
+        effects = () if helps is None or helps.effect is None else [helps.effect]
+        if not effects:
+            return found
     machine, moving, of_effects = effects_on(machine, effects)
     asked = Asked(free, prior, bounds, own, by_set(roles), fixed, of_effects=of_effects)
     given = as_fit_data(machine, measurements, roles, bool(own), moving)

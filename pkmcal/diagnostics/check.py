@@ -24,6 +24,7 @@ _OPTIONS = {  # what the command line says otherwise than `identify`; None: it h
 }
 _SEVERAL = (
     "drop",
+    "effects",
     "fix",
     "per_session",
     "unknown",
@@ -66,6 +67,8 @@ class Remedy:
     def option(self) -> str | None:
         """The option of ``pkmcal calibrate``; None where it has none."""
         several = isinstance(self.value, tuple)
+        if several and all(hasattr(each, "option") for each in self.value):  # effects
+            return f"--{self.argument} {','.join(each.option for each in self.value)}"
         if not several and (self.argument, self.value) in _OPTIONS:
             return _OPTIONS[self.argument, self.value]
         name = f"--{self.argument.replace('_', '-')}"

@@ -31,7 +31,7 @@ _NOTHING = 1e-6  # share of a torque that is none
 _MAIN = 2
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Sag:
     """Sag of an arm's joints under its own weight, an effect that `identify` finds.
 
@@ -48,14 +48,30 @@ class Sag:
 
     Examples
     --------
-    >>> Sag()
-    Sag(joints='main', tied=False, turns=0.001)
+    >>> Sag("all")
+    Sag('all')
     """
 
     joints: Joints = "main"
     tied: bool = False
     turns: float = TURNS
     name: ClassVar[str] = "sag"
+
+    def __repr__(self) -> str:
+        stated = [] if self.joints == "main" else [repr(self.joints)]
+        stated += ["tied=True"] * self.tied
+        stated += [] if self.turns == TURNS else [f"turns={self.turns!r}"]
+        return f"Sag({', '.join(stated)})"
+
+    @property
+    def option(self) -> str:
+        """As ``--effects`` has it."""
+        if self.tied:
+            return "sag=tied"
+        if self.joints == "main":
+            return "sag"
+        joints = [self.joints] if isinstance(self.joints, str | int) else self.joints
+        return f"sag={':'.join(map(str, joints))}"
 
     def of_machine(self, machine: Calibratable) -> Changed:
         """The arm with the numbers of its sag.

@@ -62,18 +62,21 @@ class Comparison:
 
 
 def compared_by_poses(
-    fit: Fit, effects: Sequence[Effect | Changed] = (), without: Collection[str] = ()
+    fit: Fit,
+    effects: Sequence[Effect | Changed] = (),
+    lacking: Collection[str] | None = None,
 ) -> Comparison | None:
-    """Compare a fit with one that has effects beside its own, or lacks numbers of its own.
+    """Compare two models of what was fitted, of which one lacks numbers of the other.
 
     Parameters
     ----------
     fit : Fit
         A solved calibration, by least squares.
     effects : sequence of Effect or Changed
-        That it does not have; a `Changed` one is of its machine as it was given.
-    without : collection of str
-        Numbers of the fit that the model without the effect does not have: they are as stated.
+        What both models have beside what was fitted; a `Changed` one is of the fit's machine.
+    lacking : collection of str, optional
+        Numbers that one of the models does not have: there they are as stated. By default those of
+        the effects.
 
     Returns
     -------
@@ -86,8 +89,10 @@ def compared_by_poses(
         return None
     equations, end = _with_effects(fit, effects) if effects else (sure.equations, fit.end)
     chosen = equations.parameters
-    own = {*fit.parameters.names} - {*without}
-    beside = np.array([name not in own for name in chosen.names])
+    fitted = {*fit.parameters.names}
+    beside = np.array([
+        name not in fitted if lacking is None else name in lacking for name in chosen.names
+    ])  # fmt: skip
     jacobian = equations.by_parameters(end, sure.factors) * chosen.scale
     if not beside.any() or jacobian.shape[0] != len(sure.labels.pose):
         return None

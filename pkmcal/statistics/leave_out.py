@@ -75,11 +75,10 @@ def leave_out(
     for lot in grouped(key):
         for k in np.unique(key[lot]).tolist():
             rows = lot[key[lot] == k]
-            own = design[rows]
-            size, axes = np.linalg.eigh(np.eye(len(rows)) - own @ own.T)
-            alone = size <= _ALONE
-            along = axes.T @ left[rows] / np.where(alone, 1.0, size)
-            part = axes @ np.where(alone, 0.0, along)
+            axes, size, _ = np.linalg.svd(design[rows], full_matrices=False)
+            alone = 1.0 - size**2 <= _ALONE
+            share = np.where(alone, 0.0, size**2 / np.where(alone, 1.0, 1.0 - size**2))
+            part = left[rows] + axes @ (share * (axes.T @ left[rows]))
             missed[rows] = np.nan if alone.any() else part
-            without[k] = back @ (found - own.T @ part)
+            without[k] = back @ (found - design[rows].T @ part)
     return LeftOut(missed, without)
