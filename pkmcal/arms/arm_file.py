@@ -45,7 +45,9 @@ def parse(source: Source) -> ArmArguments:
     joints = top.tables("joint", "an arm")
     for joint in joints:
         joint.only(("name", "kind", "axis", "point", "error", *joint_law_file.KEYS))
-    kinds = kinds_of([joint.choice("kind", KINDS, "kind of joint") for joint in joints], len(joints))
+    kinds = kinds_of(
+        [joint.choice("kind", KINDS, "kind of joint") for joint in joints], len(joints)
+    )
     axes = np.array([joint.vector("axis") for joint in joints])
     points = np.array([_point(joint) for joint in joints])
     return {

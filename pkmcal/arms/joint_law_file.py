@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -73,8 +73,10 @@ def _terms(i: int, joint: Table, kinds: Sequence[str]) -> Iterator[tuple[Term, f
     for wave in drive.tables("harmonics", "the key") if "harmonics" in drive else []:
         wave.only(("k", "cos", "sin"), "a harmonic")
         k = wave.number("k", "1" if own == "rad" else "1/mm")
-        yield Term(i, "cos", k), wave.number("cos", own, 0.0)
-        yield Term(i, "sin", k), wave.number("sin", own, 0.0)
+        kinds_of_wave: tuple[Literal["cos", "sin"], ...] = ("cos", "sin")
+        for kind in kinds_of_wave:
+            if kind in wave:
+                yield Term(i, kind, k), wave.number(kind, own)
     for by in drive.tables("coupled", "the key") if "coupled" in drive else []:
         by.only(("joint", "by"), "a coupling")
         other = by.integer("joint") - 1

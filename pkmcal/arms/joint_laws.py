@@ -175,7 +175,7 @@ class JointLaws:
 
     def moved(self, theta: FloatArray) -> FloatArray:
         """Where joints (N, n) are that are commanded to `theta` (N, n)."""
-        found = theta.copy()
+        found: FloatArray = theta.copy()
         np.add.at(found.T, self._joint, (self.basis(theta) * self.values).T)
         return found
 
@@ -271,7 +271,8 @@ class JointLaws:
         """
         rotation, axes = self._turned(theta)
         across = np.cross(self._direction, axes)
-        return np.einsum("nlkj,nik->nilj", rotation, across)
+        found: FloatArray = np.einsum("nlkj,nik->nilj", rotation, across)
+        return found
 
     @cached_property
     def _sags(self) -> FloatArray:

@@ -2,7 +2,18 @@
 
 from __future__ import annotations
 
-from pkmcal.diagnostics import course, gain, held_out, machine, noise, priors, rows, sag, search, units
+from pkmcal.diagnostics import (
+    course,
+    gain,
+    held_out,
+    machine,
+    noise,
+    priors,
+    rows,
+    sag,
+    search,
+    units,
+)
 from pkmcal.diagnostics.diagnosis import verified
 
 CHECKS = verified((

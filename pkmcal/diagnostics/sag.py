@@ -95,9 +95,7 @@ def _say(found: Solution, finding: SagFinding) -> str:
     if not gained.passes:
         return f"sag does not help beyond chance: {figures}; --effects none leaves it out"
     better = min(gained.before, gained.alone)
-    return (
-        f"the arm sags: {figures}; a controller that holds no sag is left with {better:.3f} mm"
-    )
+    return f"the arm sags: {figures}; a controller that holds no sag is left with {better:.3f} mm"
 
 
 CHECKS = (

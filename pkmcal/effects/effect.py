@@ -2,8 +2,8 @@
 
 To first order: it turns and shifts the platform by a twist, which readings then follow. Its
 coefficients are given, or estimated with the geometry. An effect that is not in the package is an
-object with the members of `Effect`; `identify(effects=[...])` takes it. What a machine solves itself
-is an effect, too: a `Changed` machine with numbers that are free and a prior on them.
+object with the members of `Effect`; `identify(effects=[...])` takes it. What the kinematics of a
+machine take into account is an effect, too: a `Changed` machine, with numbers that are free.
 """
 
 from __future__ import annotations

@@ -69,9 +69,7 @@ class Harmonics:
         """
         arm = _arm(machine, "harmonics")
         joints = _joints(arm, self.joints)
-        terms = [
-            Term(i, kind, k) for i in joints for k in self._waves() for kind in ("cos", "sin")
-        ]
+        terms = [Term(i, kind, k) for i in joints for k in self._waves() for kind in ("cos", "sin")]
         return _changed(self.name, arm, terms, self.turns)
 
 

@@ -97,7 +97,7 @@ class Sag:
     def _chosen(self, arm: SerialArm) -> list[int]:
         """The joints that yield, counted from 0."""
         largest = np.abs(_products(arm)).max(axis=(0, 2, 3))
-        turned = np.flatnonzero(largest > _NOTHING).tolist()
+        turned: list[int] = np.flatnonzero(largest > _NOTHING).tolist()
         if not turned:
             raise ArgumentError(f"sag: gravity turns no joint of {arm.name}")
         if self.joints == "all":

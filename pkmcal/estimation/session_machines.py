@@ -20,7 +20,6 @@ from pkmcal.estimation.tensioned_poses import Cells, tensioned_poses
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.kinematics.drive_state import DriveState
-from pkmcal.kinematics.robot import Robot
 
 AnyArray = TypeVar("AnyArray", FloatArray, Int32Array, BoolArray)
 

@@ -18,7 +18,7 @@ from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.free_parameters import parameters
 from pkmcal.estimation.parameters import Parameters
 from pkmcal.fitted.fit import Fit
-from pkmcal.statistics.leave_out import LeftOut, leave_out
+from pkmcal.statistics.leave_out import leave_out
 from pkmcal.statistics.linear_fit import numbered
 
 LEAST_GAIN = 0.05  # share of the rms at poses left out that an effect must take away
@@ -102,14 +102,18 @@ def compared_by_poses(
     if int(pose.max()) + 1 < LEAST_POSES:
         return None
     whole = leave_out(jacobian, values, prior, known, pose)
+    if sure.equations.unstated.all() and whole.deviation < 1.0:
+        # the noise that the fit found is more than what the effect leaves: priors weigh less
+        less = whole.deviation
+        whole = leave_out(jacobian, values, less * prior, less * known, pose)
     # as stated in place of as found: what the effect's numbers have done is undone
     undone = jacobian[:, beside] @ ((end.theta - chosen.start) / chosen.scale)[beside]
     rest = prior[:, beside].any(axis=1)
     plain = leave_out(jacobian[:, ~beside], values + undone, prior[~rest][:, ~beside],
                       known[~rest], pose)  # fmt: skip
     added = (whole.without[pose][:, beside] * jacobian[:, beside]).sum(axis=1) + undone
-    bare = LeftOut(whole.missed + added, whole.without)
-    lengths = [_squares(fit, each.missed, pose) for each in (plain, whole, bare)]
+    missed = plain.missed, whole.missed, whole.missed + added
+    lengths = [_squares(fit, each, pose) for each in missed]
     return _comparison(lengths, beside, chosen, fit)
 
 
@@ -117,7 +121,7 @@ def _squares(fit: Fit, missed: FloatArray, pose: np.ndarray) -> FloatArray:
     """Sum of the squared lengths of each pose, mm²."""
     length = fit.uncertainty.labels.length
     off = np.where(length, fit.uncertainty.in_units(missed), 0.0)
-    return np.bincount(pose, off**2)
+    return np.bincount(pose, off**2).astype(np.float64)
 
 
 def _comparison(
@@ -143,9 +147,7 @@ def _comparison(
     )
 
 
-def _with_effects(
-    fit: Fit, effects: Sequence[Effect | Changed]
-) -> tuple[Equations, Evaluation]:
+def _with_effects(fit: Fit, effects: Sequence[Effect | Changed]) -> tuple[Equations, Evaluation]:
     """The equations of the fit with effects beside its own, at its solution."""
     fitted, own = fit.parameters, fit.uncertainty.equations
     machine, asked = fitted.robot, fitted.asked

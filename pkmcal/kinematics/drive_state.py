@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
 
@@ -33,11 +33,9 @@ class DriveState(NamedTuple):
 
     def of(self, machine: M) -> M:
         """The machine in this state: a robot, or an arm, on which tension does nothing."""
-        if isinstance(machine, ArmMachine):
-            known = self.approach is not None
-            return machine.approaching(self.approach) if known else machine  # type: ignore
-        if not isinstance(machine, Robot):
-            return machine
-        if self.approach is not None:
-            machine = machine.approaching(self.approach)
-        return machine if self.tension is None else machine.tensioned(self.tension)
+        found: Any = machine
+        if isinstance(found, Robot | ArmMachine) and self.approach is not None:
+            found = found.approaching(self.approach)
+        if isinstance(found, Robot) and self.tension is not None:
+            found = found.tensioned(self.tension)
+        return cast(M, found)

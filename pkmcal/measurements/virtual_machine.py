@@ -16,7 +16,6 @@ from pkmcal.display import first_rows
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.kinematics.calibratable import ArmMachine, Solvable
 from pkmcal.kinematics.drive_state import DriveState
-from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.former import OF_MEASURE, adapted
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.tracker import Tracker

@@ -28,10 +28,13 @@ class LeftOut:
         determine what it depends on.
     without : ndarray (K, n)
         x as found without each cluster; along what is not determined it is 0.
+    deviation : float
+        Of the whitened residuals of the fit to all rows; NaN where no freedom is left.
     """
 
     missed: FloatArray
     without: FloatArray
+    deviation: float
 
 
 def leave_out(
@@ -81,4 +84,6 @@ def leave_out(
             part = left[rows] + axes @ (share * (axes.T @ left[rows]))
             missed[rows] = np.nan if alone.any() else part
             without[k] = back @ (found - design[rows].T @ part)
-    return LeftOut(missed, without)
+    freedom = count - float((design**2).sum())
+    deviation = float(np.sqrt(left @ left / freedom)) if freedom >= 1.0 else float("nan")
+    return LeftOut(missed, without, deviation)
