@@ -58,7 +58,8 @@ class Remedy:
         value = self.value
         if self.argument in _SEVERAL and before is not None:
             kept = [each for each in _listed(before) if not self._replaces(each)]
-            value = tuple(dict.fromkeys((*kept, *_listed(value))))
+            several = tuple(dict.fromkeys((*kept, *_listed(value))))
+            value = several if len(several) > 1 else value
         return {**arguments, self.argument: value}
 
     def _replaces(self, word: object) -> bool:
