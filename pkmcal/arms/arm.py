@@ -358,10 +358,15 @@ class SerialArm(SerialChain, Result):
         Raises
         ------
         ValueError
-            The source holds another arm, or none is known.
+            The source holds another arm, or none is known; joints that have laws.
         """
         from pkmcal.arms import urdf
 
+        if self.laws is not None:
+            raise ArgumentError(
+                f"robot: {self.name}: a URDF does not hold what joints add to their commands; save"
+                " arm.rigid"
+            )
         if source is None:
             if self.source is None:
                 raise ArgumentError("source: this arm was not read from a URDF file; name one")

@@ -62,8 +62,8 @@ def _refitted(found: Solution) -> SerialArm:
     machine = ArmMachine(chosen.robot.arm.rigid)
     own = [name for name in chosen.names if name in machine.geometry.names]
     asked = replace(chosen.asked, free=own, of_effects={})
-    rigid = parameters(machine, equations.datasets, asked)
-    whole, exact, start = begun(equations.datasets, rigid, equations.missing)
+    rigid = parameters(machine, equations.prediction.datasets, asked)
+    whole, exact, start = begun(equations.prediction.datasets, rigid, equations.missing)
     end = estimator_at(whole, exact, start, found.fit.estimate.state.loss.name).solve()
     theta = end.evaluation.theta
     arm = as_given(machine.replace(rigid.values_at(theta)))

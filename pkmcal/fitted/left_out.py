@@ -102,7 +102,7 @@ def compared_by_poses(
     if int(pose.max()) + 1 < LEAST_POSES:
         return None
     whole = leave_out(jacobian, values, prior, known, pose)
-    if sure.equations.unstated.all() and whole.deviation < 1.0:
+    if sure.equations.blocks.unstated.all() and whole.deviation < 1.0:
         # the noise that the fit found is more than what the effect leaves: priors weigh less
         less = whole.deviation
         whole = leave_out(jacobian, values, less * prior, less * known, pose)
@@ -156,7 +156,7 @@ def _with_effects(fit: Fit, effects: Sequence[Effect | Changed]) -> tuple[Equati
         if isinstance(each, Changed):
             machine = each.machine
             asked = replace(asked, of_effects={**asked.of_effects, **each.free})
-    datasets = [replace(data, effects=(*data.effects, *moving)) for data in own.datasets]
+    datasets = [replace(data, effects=(*data.effects, *moving)) for data in own.prediction.datasets]
     chosen = parameters(machine, datasets, asked)
     place = {name: c for c, name in enumerate(chosen.names)}
     here = [place[name] for name in fitted.names]
