@@ -15,7 +15,7 @@ OPTION = "--effects"
 AUTO = "auto"
 HELP = (
     "What arms do beside their geometry: sag, the joints that gravity turns most; sag=all,"
-    " sag=2:3:5, sag=tied by known masses; harmonics=1:2 waves a turn; coupling=5.4, joint 5 turned"
+    " sag=2:3:5, sag=tied by known masses; harmonics=1:2 waves a turn, harmonics=200@3 of joint 3; coupling=5.4, joint 5 turned"
     " by 4; backlash; auto: what helps at poses left out; none. Separate several with commas."
 )
 
@@ -62,7 +62,9 @@ def _sag(of: str) -> Sag:
 
 
 def _harmonics(of: str) -> Harmonics:
-    return Harmonics([typed(each) for each in of.split(":")])
+    waves, _, joints = of.partition("@")
+    found = [typed(each) for each in waves.split(":")]
+    return Harmonics(found, _joints(joints)) if joints else Harmonics(found)
 
 
 def _coupling(of: str) -> Coupling:
@@ -86,7 +88,7 @@ _READ: dict[str, Callable[[str], Any]] = {
 }
 _FORMS = {
     "sag": "sag, sag=all, sag=tied or joints, sag=2:3",
-    "harmonics": "waves a turn, harmonics=1:2",
+    "harmonics": "waves a turn, harmonics=1:2, or of some joints, harmonics=200@3",
     "coupling": "a joint and the one that turns it, coupling=5.4:6.4",
     "backlash": "backlash, or joints, backlash=1:2",
 }

@@ -13,11 +13,12 @@ from pkmcal.diagnostics import (
     sag,
     search,
     units,
+    waves,
 )
 from pkmcal.diagnostics.diagnosis import verified
 
 CHECKS = verified((
     *held_out.CHECKS, *units.CHECKS, *machine.CHECKS, *search.CHECKS, *rows.CHECKS, *noise.CHECKS,
-    *priors.CHECKS, *course.CHECKS, *gain.CHECKS, *sag.CHECKS,
+    *priors.CHECKS, *course.CHECKS, *gain.CHECKS, *sag.CHECKS, *waves.CHECKS,
 ))  # fmt: skip
 AT_ONCE = tuple(check for check in CHECKS if check.at_once)
