@@ -249,6 +249,8 @@ def test_waves_that_a_regular_grid_cannot_tell_apart_are_said() -> None:
     m = measured(theta, true, 5, SOFT)
     found = pk.identify(ARM, m, effects=[pk.Sag("all")], unknown="frame")
     (wave,) = scan_waves(found)
-    assert wave.joint == 3 and wave.waves % 36 in (20, 16)
+    assert wave.joint == 3
+    alike = [(wave.waves + sign * 200 + 18) % 36 - 18 for sign in (-1, 1)]
+    assert min(map(abs, alike)) <= 3  # which the joint's range does not tell apart
     assert wave.steps == pytest.approx(np.radians(10.0))
     assert any("look alike" in text for text in found.verdict.remarks)
