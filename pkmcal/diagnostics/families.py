@@ -2,14 +2,15 @@
 
 Without a stated sigma the noise of each family is what its residuals are: angles of other rows, in
 another order or a column that was not filled would count as an instrument with a noise of degrees.
-No instrument has that. Such residuals do not fall in the fit, are far above those of the other
-family as arcs, and are larger than any error of a machine, or follow from the angles themselves.
+No instrument has that. Such residuals are far above those of the other family as arcs, and follow
+from the angles themselves, or they do not fall and are larger than any error of a machine.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,6 +24,8 @@ from pkmcal.statistics.distributions import f_tail
 GROSS = 0.05  # share of the machine's size by which measurements may be off before a calibration
 _KEPT = 0.5  # share of a misfit that is left where the fit found nothing of it
 _UNLIKE = 10.0  # times the misfit of the other family, in mm
+_LEAST_ROWS = 6  # from which equal numbers are no chance
+_VARIES = 1e-6  # share of the machine's size above which a predicted number varies
 _CHANCE = 1e-3  # of residuals that follow from what they are of as much, if they were noise
 
 
@@ -63,12 +66,45 @@ def unlike_families(found: Solution) -> Iterator[UnlikeFamily]:
             columns = list(family.columns)
             off, other = after[number], min(np.delete(after, number))
             before = _median((start.residuals[i] * arcs)[:, columns])
-            if not (off > _KEPT * before and off > _UNLIKE * other):
+            if not off > _UNLIKE * other:
                 continue
             residual, predicted = end.residuals[i][:, columns], end.predicted[i][:, columns]
-            if off > GROSS * size or _follows(residual, predicted) < _CHANCE:
+            gross = off > GROSS * size and off > _KEPT * before
+            if gross or _follows(residual, predicted) < _CHANCE:
                 arc = float(arcs[columns[0]])
                 yield UnlikeFamily(i, family, before / arc, off / arc, off / max(other, 1e-300))
+
+
+class Constant(NamedTuple):
+    """A component that is the same number in every row: its name, and that number."""
+
+    name: str
+    unit: str
+    value: float
+
+
+def constant_components(found: Solution) -> Iterator[Constant]:
+    """Components that are equal to the last digit where the machine says they vary."""
+    end, equations = found.fit.end, found.fit.equations
+    size = found.fit.parameters.robot.length
+    for i, m in enumerate(equations.sets):
+        values = m.values.reshape(len(m), -1)
+        names = m.components if len(m.instrument.families) > 1 else ()
+        for k, name in enumerate(names):
+            rows = np.isfinite(values[:, k]) & np.isfinite(end.predicted[i][:, k])
+            read, predicted = values[rows, k], end.predicted[i][rows, k]
+            if len(read) < _LEAST_ROWS or (read != read[0]).any():
+                continue
+            if float(np.ptp(predicted)) * equations.arcs[i][k] > _VARIES * size:
+                yield Constant(name, m.units[k], float(read[0]))
+
+
+def _constant_text(found: Solution, seen: Constant) -> str:
+    value, unit = displayed(seen.value, seen.unit)
+    return (
+        f"{seen.name} is {value:g} {unit} in every row, where the machine's varies: if it was not"
+        " measured leave its column empty"
+    )
 
 
 def _median(residual: FloatArray) -> float:
@@ -105,15 +141,20 @@ def _text(found: Solution, seen: UnlikeFamily) -> str:
     several = len(found.fit.equations.sets) > 1
     whose = f" of measurements {seen.number + 1}" if several else ""
     return (
-        f"the {seen.family.noun}{whose} are off by {after:.3g} {unit} as before the fit"
-        f" ({before:.3g} {unit}), {seen.ratio:.2g} times as much as the rest: look at their columns,"
-        " rows and signs; if that is their noise, state sigma"
+        f"the {seen.family.noun}{whose} are off by {after:.3g} {unit} ({before:.3g} {unit} before"
+        f" the fit), {seen.ratio:.2g} times as much as the rest: look at their columns, rows,"
+        " signs and order; if that is their noise, state sigma"
     )
 
 
 CHECKS = (
     Check(
-        name="family-off", about="lengths or angles are off as before the fit, the others fit",
-        unless=("unit-errors",), run=unlike_families, say=_text,
+        name="family-off", about="lengths or angles do not fit where the others do",
+        unless=("unit-errors", "constant-component"), run=unlike_families, say=_text,
+    ),
+    Check(
+        name="constant-component",
+        about="a component of poses is one number in all rows, as a column that was not measured",
+        run=constant_components, say=_constant_text,
     ),
 )  # fmt: skip

@@ -5,16 +5,15 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from pkmcal.measurements.inverted import inverted
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.measurements.table_layout import ORDERS
+from pkmcal.measurements.table_layout import ORDERS, OWN_ORDER
 from pkmcal.readings.reading import Family
 
-_GIVEN = "xyz"  # how angles that were read are turned: about fixed axes, x first
 _OWN = ("XYZ", "XZY", "YXZ", "YZX", "ZXY")  # other orders of an angle about x, y and z each
 _REVERSED = "counts the other way"
 _FACTORS = {
@@ -79,18 +78,20 @@ def _of_column(name: str, words: str) -> str:
 
 def _other_turns(measured: Measurements) -> Iterator[tuple[str, Measurements]]:
     """Read orientations in other orders, from the other side, quaternions from the other end."""
+    from scipy.spatial.transform import Rotation
+
     first = measured.instrument.turning
     if first is None or measured.values is None:
         return
     turned = measured.values[:, first : first + 3]
     good = np.isfinite(turned).all(axis=1)
 
-    def of(turns: Rotation) -> Measurements:
+    def of(turns: Any) -> Measurements:
         values = measured.values.copy()
-        values[good, first : first + 3] = turns.as_euler(_GIVEN)
+        values[good, first : first + 3] = turns.as_euler(OWN_ORDER)
         return replace(measured, values=values)
 
-    given = Rotation.from_euler(_GIVEN, turned[good])
+    given = Rotation.from_euler(OWN_ORDER, turned[good])
     q = given.as_quat()  # x y z w
     for words, other in (
         ("the scalar of the quaternions is their last number", q[:, [3, 0, 1, 2]]),
@@ -101,7 +102,7 @@ def _other_turns(measured: Measurements) -> Iterator[tuple[str, Measurements]]:
         angles = turned[good][:, ["XYZ".index(axis) for axis in order]]
         words = f"the angles are about turned axes in the order {order} (--rotation {order})"
         yield words, of(Rotation.from_euler(order, angles))
-    for order in sorted({*ORDERS} - {_GIVEN, "XYZ"}):
+    for order in sorted({*ORDERS} - {OWN_ORDER, "XYZ"}):
         words = (
             f"the angles are, one after the other, those of {order} (columns A, B, C with"
             f" --rotation {order})"

@@ -42,7 +42,7 @@ def inverted(measured: Measurements) -> Measurements:
             f"invert_poses: values of kind {measured.kind!r} have no orientation that could be"
             " turned round"
         )
-    values = _inverse(measured.values, first)
+    values = turned_round(measured.values, first)
     if measured.sigma is None:
         return replace(measured, values=values)
     sigma = measured.sigma
@@ -56,7 +56,8 @@ def inverted(measured: Measurements) -> Measurements:
     )
 
 
-def _inverse(values: FloatArray, first: int) -> FloatArray:
+def turned_round(values: FloatArray, first: int) -> FloatArray:
+    """The inverse of poses (N, 6), or of orientations (N, 3), whose angles begin at `first`."""
     poses = np.zeros((len(values), 6))
     poses[:, 3 - first :] = np.nan_to_num(values)
     motion = screw.from_pose(poses)
@@ -72,7 +73,7 @@ def _derivative(values: FloatArray, first: int) -> FloatArray:
     """Derivative (N, k, k) of the inverse by what was measured."""
     columns = []
     for step in _STEP * np.eye(values.shape[1]):
-        change = _inverse(values + step, first) - _inverse(values - step, first)
+        change = turned_round(values + step, first) - turned_round(values - step, first)
         turned = change[:, first:]
         change[:, first:] = np.arctan2(np.sin(turned), np.cos(turned))
         columns.append(change / (2.0 * _STEP))
