@@ -56,7 +56,7 @@ def unlike_families(found: Solution) -> Iterator[UnlikeFamily]:
     """Families of sets without a stated sigma that do not fit where another does."""
     start, end, equations = found.fit.start, found.fit.end, found.fit.equations
     size = found.fit.parameters.robot.length
-    for i, m in enumerate(equations.sets):
+    for i, m in enumerate(equations.table.sets):
         families = m.instrument.families
         if m.sigma is not None or len(families) < 2:
             continue
@@ -87,7 +87,7 @@ def constant_components(found: Solution) -> Iterator[Constant]:
     """Components that are equal to the last digit where the machine says they vary."""
     end, equations = found.fit.end, found.fit.equations
     size = found.fit.parameters.robot.length
-    for i, m in enumerate(equations.sets):
+    for i, m in enumerate(equations.table.sets):
         values = m.values.reshape(len(m), -1)
         names = m.components if len(m.instrument.families) > 1 else ()
         for k, name in enumerate(names):
@@ -138,7 +138,7 @@ def _follows(residual: FloatArray, predicted: FloatArray) -> float:
 def _text(found: Solution, seen: UnlikeFamily) -> str:
     after, unit = displayed(seen.after, seen.family.unit)
     before, _ = displayed(seen.before, seen.family.unit)
-    several = len(found.fit.equations.sets) > 1
+    several = len(found.fit.equations.table.sets) > 1
     whose = f" of measurements {seen.number + 1}" if several else ""
     return (
         f"the {seen.family.noun}{whose} are off by {after:.3g} {unit} ({before:.3g} {unit} before"

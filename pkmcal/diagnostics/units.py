@@ -102,14 +102,16 @@ def _better_where_reached(trial: FloatArray, off: FloatArray) -> bool:
 def _unit_errors(found: Solution) -> list[str]:
     """Suspect units where the fit is poor, or leads far off."""
     poor = found.rms > _POOR * found.rms_before or found.chi2_per_dof > NOISY
-    if not poor and not far_numbers(found):
+    unlike = any(True for _ in unlike_families(found))
+    if not poor and not unlike and not far_numbers(found):
         return []
     equations, end = found.fit.uncertainty.equations, found.fit.end
-    named = likely_unit_errors(equations.datasets, equations.parameters, found.fit.start)
-    if named or not any(True for _ in unlike_families(found)):
+    sets = equations.prediction.datasets
+    named = likely_unit_errors(sets, equations.parameters, found.fit.start)
+    if named or not unlike:
         return named
     # the other family has found the machine, whose own errors then hide no convention
-    return likely_unit_errors(equations.datasets, end.parameters, end, near=end.theta, least=0.0)
+    return likely_unit_errors(sets, end.parameters, end, near=end.theta, least=0.0)
 
 
 CHECKS = (

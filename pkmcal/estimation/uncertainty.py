@@ -135,25 +135,25 @@ class Uncertainty:
 
     def family_of(self, i: int, family: int) -> BoolArray:
         """Equations (M,) of one family of set `i`, by its number there."""
-        columns = self.equations.sets[i].instrument.families[family].columns
+        columns = self.equations.table.sets[i].instrument.families[family].columns
         mine: BoolArray = (self.labels.set_of == i) & np.isin(self._place, columns)
         return mine
 
     @cached_property
     def _place(self) -> IntArray:
         """Which component of its row each equation is (M,)."""
-        every = [np.tile(np.arange(len(m.components)), len(m)) for m in self.equations.sets]
+        every = [np.tile(np.arange(len(m.components)), len(m)) for m in self.equations.table.sets]
         return np.concatenate(every)[self.equations.whitening.present]
 
     @cached_property
     def noises(self) -> tuple[Noise, ...]:
         """Variances in mm² of a length of each set; NaN where nothing shows them."""
-        return tuple(self.noise_of(i) for i in range(len(self.equations.sets)))
+        return tuple(self.noise_of(i) for i in range(len(self.equations.table.sets)))
 
     @cached_property
     def excess(self) -> Noise:
         """Variances of an equation in units of what it was whitened by."""
-        if self.equations.unstated.any() or self.fit.freedom >= FEW:
+        if self.equations.blocks.unstated.any() or self.fit.freedom >= FEW:
             sandwich = self.covariance.sandwich
             return noise(sandwich.residual, sandwich.retained, self.fit.key)
         return 1.0, 0.0
@@ -163,7 +163,7 @@ class Uncertainty:
         stated = self.stated_variances(i, family)
         if self.mixed:
             own = float(self.factors[i] ** 2 if stated is None else stated.mean())
-            shown = self.equations.sets[i].components and not self.unknown[i]
+            shown = self.equations.table.sets[i].components and not self.unknown[i]
             return own * self.excess[0] if shown else float("nan"), 0.0
         if stated is not None and self.fit.freedom < FEW:
             return float(stated.mean()), 0.0
@@ -173,7 +173,7 @@ class Uncertainty:
 
     def stated_variances(self, i: int, family: int = 0) -> FloatArray | None:
         """`stated_variances` of set `i` in mm², of angles those of their arcs."""
-        m = self.equations.sets[i]
+        m = self.equations.table.sets[i]
         stated = stated_variances(m, family)
         if stated is None:
             return None
@@ -200,7 +200,7 @@ class Uncertainty:
             return joined([])
         values = self.in_units(self.fit.residual) if plain else self.fit.residual
         parts = []
-        for i in range(len(self.equations.sets)):
+        for i in range(len(self.equations.table.sets)):
             mine = self.lengths_of(i) if plain else self.labels.set_of == i
             leverage = float(self.fit.leverage[mine].sum())
             if mine.any():
@@ -227,7 +227,11 @@ def uncertainty(
     named, fit = solution
     chosen = equations.parameters
     rates = chosen.reported_rates(estimate.evaluation.theta) * chosen.scale
-    if rule == "auto" and equations.closures.unknowns and fit.clusters < len(equations.components):
+    if (
+        rule == "auto"
+        and equations.closures.unknowns
+        and fit.clusters < len(equations.blocks.components)
+    ):
         rule = "cluster"  # no two mixtures can be compared to see whether they share an error
     slips = slipped(estimator, estimate)
     if rule == "auto" and (slips != 1.0).any():
@@ -260,7 +264,7 @@ def solved(estimator: Estimator, estimate: Estimate) -> LinearModel:
     if estimator.loss != "linear":
         residual, _, _ = pseudo_residuals(
             residual,
-            estimator.equations.components,
+            estimator.equations.blocks.components,
             estimate.weights,
             state.loss.decline(residual),
             state.determined.rank,
@@ -296,7 +300,7 @@ def unlike_components(
     where equations are mixtures.
     """
     equations = estimator.equations
-    several = any(len(m.components) > 1 for m in equations.sets)
+    several = any(len(m.components) > 1 for m in equations.table.sets)
     if equations.closures.unknowns:
         return None
     if estimator.loss != "linear" or not estimator.unstated.all() or not several:
@@ -304,7 +308,7 @@ def unlike_components(
     named, fit = solution
     if shared_error_score(fit) > SHARED:
         return None
-    every = [np.tile(np.arange(len(m.components)), len(m)) for m in equations.sets]
+    every = [np.tile(np.arange(len(m.components)), len(m)) for m in equations.table.sets]
     place = np.concatenate(every)[equations.whitening.present]
     schemes = (np.zeros(6), [0, 0, 0, 1, 1, 1], [0, 0, 1, 2, 2, 2], np.arange(6))
     candidates = [
@@ -313,7 +317,7 @@ def unlike_components(
     found = told_apart(fit, candidates, _prior_residual(estimator, estimate))
     if found is None:
         return None
-    deviations = [np.ones(len(m.components)) for m in equations.sets]
+    deviations = [np.ones(len(m.components)) for m in equations.table.sets]
     of_equation = np.sqrt(found.variances)[found.classes]
     for i, k, deviation in zip(named.set_of, place, of_equation, strict=True):
         deviations[i][k] = deviation

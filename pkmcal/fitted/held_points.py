@@ -115,7 +115,7 @@ def points(
     by_actuators = after.machines.actuator_twists(after.states)
     variances, added, families, per_mm = [], [], [], []
     seen = equations.prediction.predicted(after)
-    for i, measured in enumerate(equations.sets):
+    for i, measured in enumerate(equations.table.sets):
         count, k = after.residuals[i].shape
         family = _families(measured, uncertainty, rows.like[i])
         each = [_variances(measured, uncertainty, rows.like[i], *pair) for pair in family]
@@ -123,7 +123,7 @@ def points(
         families.append(np.tile(np.array([there for _, there in family], dtype=np.intp), count))
         per_mm.append(np.tile(arcs[i], count))
         sigma = _of_actuators(measured, after.robot, uncertainty)
-        moved = seen[i].by_twist @ by_actuators[equations.pose_of[i]]
+        moved = seen[i].by_twist @ by_actuators[equations.table.pose_of[i]]
         part = (
             np.zeros((count, k)) if sigma is None else ((moved * sigma[:, None]) ** 2).sum(axis=2)
         )
@@ -147,7 +147,7 @@ def points(
         if uncertainty.mixed:
             weighted += by_sigma / uncertainty.excess[0]
         taken = np.clip(((by_own @ own.half) ** 2).sum(axis=1) / weighted, 0.0, 1.0)
-    units = tuple(dict.fromkeys(unit for m in equations.sets for unit in m.units))
+    units = tuple(dict.fromkeys(unit for m in equations.table.sets for unit in m.units))
     return Points(
         residual=stacked([a * part for a, part in zip(arcs, after.residuals, strict=True)]),
         design=by_fitted @ back,
@@ -155,7 +155,7 @@ def points(
         by_actuators=by_sigma,
         taken=taken,
         unit=np.concatenate(
-            [np.tile([units.index(unit) for unit in m.units], len(m)) for m in equations.sets]
+            [np.tile([units.index(unit) for unit in m.units], len(m)) for m in equations.table.sets]
         )[present],
         like=np.array(rows.like)[named.set_of],
         family=np.concatenate(families)[present],
@@ -170,7 +170,9 @@ def _families(measured: Measurements, uncertainty: Uncertainty, like: int) -> li
     That of the same unit. Where a reading of one family is compared with a fit that has none of
     its unit the first, as arcs; -1 where nothing is known.
     """
-    mine, theirs = (m.instrument.families for m in (measured, uncertainty.equations.sets[like]))
+    mine, theirs = (
+        m.instrument.families for m in (measured, uncertainty.equations.table.sets[like])
+    )
     units = [each.unit for each in theirs]
     other = 0 if len(mine) == 1 and theirs else -1
     there = [units.index(each.unit) if each.unit in units else other for each in mine]
@@ -186,7 +188,7 @@ def _variances(
         return np.full(len(measured), np.nan)
     total = uncertainty.noise_of(like, there)[0]
     own = stated_variances(measured, family)
-    fitted = stated_variances(uncertainty.equations.sets[like], there)
+    fitted = stated_variances(uncertainty.equations.table.sets[like], there)
     if own is None or fitted is None:
         return np.full(len(measured), total)
     return own * total / float(fitted.mean())

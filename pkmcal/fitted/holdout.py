@@ -159,7 +159,7 @@ def evaluate(
     rows = replace(rows, parameters=equations.parameters)  # their own frames have been laid
     named = labels(equations)
     seen = points(rows, equations, after, named, own, uncertainty)
-    row, count = named.row, len(equations.rows)
+    row, count = named.row, len(equations.table.rows)
     off_before, off = (misfits.distances(equations, each) for each in (before, after))
     good = np.isfinite(off)
     expected = np.bincount(row, seen.own + seen.by_fit(uncertainty), count)
@@ -175,8 +175,8 @@ def evaluate(
         holdout_unreached=equations.failures(after),
         holdout_off_before=off_before,
         holdout_off=off,
-        holdout_rows=equations.rows,
-        holdout_outliers=tuple(equations.rows[odd].tolist()),
+        holdout_rows=equations.table.rows,
+        holdout_outliers=tuple(equations.table.rows[odd].tolist()),
         holdout_distances_before=in_short[0],
         holdout_distances=in_short[1],
         holdout_families=tuple(judged),
