@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, rms
+from pkmcal.arrays import BoolArray, FloatArray, rms
 from pkmcal.diagnostics.check import Check
 from pkmcal.diagnostics.families import GROSS, unlike_families
 from pkmcal.diagnostics.machine import far_numbers
@@ -52,29 +52,48 @@ def likely_unit_errors(
         if present <= least * size:
             continue
         trials = {
-            words: _misfits(
-                np.where(read, _alone(replace(data, measured=other), parameters, near), 0.0),
-                other,
-                size,
-            )
+            words: (_read_as(replace(data, measured=other), parameters, near, read), shrunk)
             for words, other in other_readings(data.measured, parameters.robot.actuator_units)
+            if (shrunk := _shrunk(data.measured, other)) > 0.0
         }
-        misfit = {words: _together(trial) for words, trial in trials.items()}
+        # smaller numbers misfit by less, whatever they mean: a machine without lengths fits any
+        misfit = {words: _together(off) / by for words, (off, by) in trials.items()}
         # exchanges that are equivalent on a symmetric machine misfit alike
-        least = min(misfit.values())
-        words = next(text for text in trials if misfit[text] <= least * (1.0 + _ALIKE))
-        if misfit[words] < MISFIT_RATIO * present and _better_where_reached(trials[words], off):
+        lowest = min(misfit.values())
+        words = next(text for text in trials if misfit[text] <= lowest * (1.0 + _ALIKE))
+        if misfit[words] < MISFIT_RATIO * present and _better_where_reached(trials[words][0], off):
             which = f"measurements {i + 1}: " if len(datasets) > 1 else ""
             where = (
                 f"off by {present:.3g} mm" if np.isfinite(present) else "out of the machine's reach"
             )
-            found.append(f"{which}{where} as given, but by {misfit[words]:.3g} mm if {words}")
+            found.append(
+                f"{which}{where} as given, but by {_together(trials[words][0]):.3g} mm if {words}"
+            )
     return found
 
 
 def _alone(data: FitData, parameters: Parameters, near: FloatArray | None) -> FloatArray:
     (residual,) = Equations.of([data], parameters).with_exact_actuators().start(near).residuals
     return residual
+
+
+def _read_as(
+    data: FitData, parameters: Parameters, near: FloatArray | None, read: BoolArray
+) -> FloatArray:
+    """Misfit of each row as it is read now, mm; only of what was read."""
+    residual = np.where(read, _alone(data, parameters, near), 0.0)
+    return _misfits(residual, data.measured, parameters.robot.length)
+
+
+def _shrunk(given: Measurements, other: Measurements) -> float:
+    """By how much smaller measured numbers become, at most 1."""
+    turning = given.instrument.turning  # orientations do not become small
+    columns = slice(None) if turning is None else slice(0, turning)
+    before, after = (
+        np.linalg.norm(np.nan_to_num(m.values.reshape(len(m), -1)[:, columns]))
+        for m in (given, other)
+    )
+    return min(1.0, float(after / before)) if before > 0.0 else 1.0
 
 
 def _misfits(residual: FloatArray, measured: Measurements, size: float) -> FloatArray:
