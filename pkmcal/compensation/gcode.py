@@ -32,6 +32,19 @@ class Extrusion(NamedTuple):
     relative: bool | None
 
 
+class Feed(NamedTuple):
+    """What F says, of lengths in mm and of angles in deg a minute; 0 where none was stated.
+
+    A change of units behind F changes neither, though one F cannot state both then.
+    """
+
+    lengths: float
+    turns: float
+
+
+_NO_FEED = Feed(0.0, 0.0)
+
+
 @dataclass
 class Move:
     """A G0 or G1 with axis words.
@@ -40,8 +53,10 @@ class Move:
     ----------
     line : int
         Its line, counted from 0.
+    code : str
+        G0 or G1.
     straight : bool
-        G1.
+        Whether it goes along a line with its feed.
     start, target : ndarray (axes,)
         In mm and deg, absolute.
     known : bool
@@ -57,8 +72,8 @@ class Move:
         Mm of a unit of length.
     extrusion : Extrusion or None
         Its E word.
-    feed : float
-        Mm or deg a minute; 0 where none was stated.
+    feed : Feed
+        The feed that is in force.
     feed_word : Word or None
         Its F word.
     per_turn : bool
@@ -67,9 +82,12 @@ class Move:
         Whether G93 has to stand before it, where moves are to state their times.
     behind : str
         What acts behind it in its line.
+    repeated : str
+        Words that each of its parts has to state.
     """
 
     line: int
+    code: str
     straight: bool
     start: FloatArray
     target: FloatArray
@@ -79,11 +97,12 @@ class Move:
     relative: bool
     scale: float
     extrusion: Extrusion | None
-    feed: float
+    feed: Feed
     feed_word: Word | None
     per_turn: bool
     begins_times: bool
     behind: str
+    repeated: str
 
 
 @dataclass
@@ -96,6 +115,8 @@ class _State:
         Axes of which it is known where they are.
     lost_by : str
         The word behind which that is not known.
+    code : str
+        The last of G0 and G1; empty before them and behind G80.
     own, last : bool or None
         M83; whether the last of G90, G91, M82 and M83 was G91 or M83.
     timed : bool
@@ -106,10 +127,10 @@ class _State:
     known: set[str]
     lost_by: str = ""
     fresh: bool = True
-    straight: bool | None = None
+    code: str = ""
     relative: bool = False
     scale: float = 1.0
-    feed: float = 0.0
+    feed: Feed = _NO_FEED
     per_turn: bool = False
     extruded: float | None = None
     own: bool | None = None
@@ -232,8 +253,15 @@ class Program:
             raise Unclear(
                 "F beside a change of units is of those before: give it a line of its own"
             )
+        macro = ""
         for command in found:
             meaning = self._meaning(command)
+            if macro and meaning is not Meaning.HARMLESS:
+                raise Unclear(
+                    f"behind {macro}, {command.shown} may not be executed: break the line"
+                )
+            if meaning in (Meaning.HOMES, Meaning.MOVES) and not self.dialect.block:
+                macro = command.shown
             if meaning is Meaning.HOMES:
                 self._home(state)
             elif meaning is Meaning.MOVES:
@@ -300,7 +328,7 @@ class Program:
         elif name in ("G94", "G95"):
             state.per_turn = name == "G95"
         elif name == "G80":
-            state.straight = None
+            state.code = ""
         elif name in ("M2", "M30"):
             state.timed = False
 
@@ -310,14 +338,15 @@ class Program:
         axes = {letter: word for letter, word in words.items() if letter in AXES}
         unknown = words.keys() - AXES - self.dialect.letters
         if not command.name and (axes or not self.dialect.block):
-            if state.straight is None or not self.dialect.block:
+            if not state.code or not self.dialect.block:
                 raise Unclear("axis words without G0 or G1 before them")
         elif command.name:
-            state.straight = command.name == "G1"
+            state.code = command.name
         if unknown:
             raise Unclear(f"{min(unknown)} is no word of {command.shown} that is followed")
         feed = words.get("F")
-        state.feed = state.feed if feed is None else feed.value * state.scale
+        if feed is not None:
+            state.feed = Feed(feed.value * state.scale, feed.value)
         extrusion = self._extrusion(words.get("E"), state)
         if not axes:
             return []
@@ -333,7 +362,8 @@ class Program:
         return [
             Move(
                 line=i,
-                straight=bool(state.straight),
+                code=state.code,
+                straight=state.code == "G1" or self.dialect.rapid_lines,
                 start=start,
                 target=state.at,
                 known=known and (self._stated or fresh is None),
@@ -347,6 +377,10 @@ class Program:
                 per_turn=state.per_turn,
                 begins_times=begins_times,
                 behind=command.behind,
+                repeated="".join(
+                    f" {letter}{words[letter].value:.15g}"
+                    for letter in sorted(self.dialect.repeated & words.keys())
+                ),
             )
         ]
 

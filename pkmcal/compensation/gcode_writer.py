@@ -57,13 +57,13 @@ class Writer:
         if move.begins_times:
             mark = MARK if text.startswith(MARK) else ""
             text = mark + "G93" + end + text[len(mark) :]
-        head = "G1" if move.straight else "G0"
         for words, extra, feed in pieces[1:]:
             named = [letter + value for letter, value in words.items()]
-            text += " ".join([head, *named, *filter(None, [extra, feed])]) + end
+            text += " ".join([move.code, *named, *filter(None, [extra, feed])])
+            text += move.repeated + end
         if fed and not self._machine.joints:
             head = "" if self._program.dialect.block else "G1 "
-            text += f"{head}F{_figures(move.feed / move.scale)}" + end
+            text += f"{head}F{_figures(move.feed.turns)}" + end
         return text if line.endswith(("\n", "\r")) else text[: -len(end)]
 
     def _require(self, move: Move, parts: int) -> None:
@@ -73,7 +73,7 @@ class Writer:
             raise self._program.wrong(
                 move.line, "joint moves are made of absolute coordinates in mm"
             )
-        if self._machine.joints and move.straight and (move.per_turn or move.feed <= 0.0):
+        if self._machine.joints and move.straight and (move.per_turn or move.feed.turns <= 0.0):
             raise self._program.wrong(
                 move.line, "a joint move needs the feed F of its G1, in mm a minute"
             )
@@ -144,23 +144,31 @@ class Writer:
         joints = self._machine.joints
         if not move.straight or (not joints and (self._lengths.all() or None in last)):
             return ""
-        way = self._way(point - before)
+        meant, way = self._way(point - before)
+        rate = move.feed.lengths if meant else move.feed.turns
         if joints:
-            return f"F{_figures(move.feed / way)}" if way else "F1000000"
+            return f"F{_figures(rate / way)}" if way else "F1000000"
         step = np.array(self._last, dtype=float) - np.array(last, dtype=float)
-        lengths = self._lengths
-        longer = self._way(step) / way if way else 1.0
-        if np.any(step[lengths]) != np.any((point - before)[lengths]):
-            longer *= 1.0 / move.scale if np.any(step[lengths]) else move.scale
-        if longer == 0.0 or abs(longer - 1.0) <= _SLOWER:
+        written, longer = self._way(step)
+        taken = move.feed.lengths if written else move.feed.turns
+        if not taken:  # at a speed of the firmware's own
+            rate = taken = 1.0
+        if not way or not longer or abs(longer * rate - way * taken) <= _SLOWER * way * taken:
             return ""
-        if move.feed <= 0.0:
+        if move.feed.turns <= 0.0:
             raise self._program.wrong(move.line, "needs a feed F: corrected, its length changes")
-        return f"F{_figures(move.feed / move.scale * longer)}"
+        if not np.isclose(move.feed.lengths, move.feed.turns * move.scale, rtol=1e-9, atol=0.0):
+            raise self._program.wrong(
+                move.line,
+                "its feed F was stated in other units, which changes it along X Y Z and not along"
+                " angles: state F again behind G20 or G21",
+            )
+        return f"F{_figures(longer / (move.scale if written else 1.0) * rate / way)}"
 
-    def _way(self, step: FloatArray) -> float:
-        """How long a step is to a feed: mm, or degrees if only angles change."""
-        return float(np.linalg.norm(step[self._lengths]) or np.linalg.norm(step[~self._lengths]))
+    def _way(self, step: FloatArray) -> tuple[bool, float]:
+        """Whether a step has lengths, and how long it is to a feed: mm, or deg without any."""
+        way = float(np.linalg.norm(step[self._lengths]))
+        return way > 0.0, way or float(np.linalg.norm(step[~self._lengths]))
 
 
 def _first(line: str, move: Move, words: dict[str, str], extra: str, feed: str) -> str:
