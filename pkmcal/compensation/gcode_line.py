@@ -18,19 +18,19 @@ def _ascii(pattern: str) -> re.Pattern[str]:
 
 
 _WORD = _ascii(rf"([A-Za-z])[ \t]*({_NUMBER})")
-_PLAIN = _ascii(rf"\s*(?:[A-Za-z][ \t]*{_NUMBER}\s*)*")
+_PLAIN = _ascii(rf"[ \t]*(?:[A-Za-z][ \t]*{_NUMBER}[ \t]*)*")
 _HEAD = _ascii(
-    r"\s*(?:[Nn][ \t]*\d+(?:[ \t]+|$))?"
+    r"[ \t]*(?:[Nn][ \t]*\d+(?:[ \t]+|$))?"
     r"(?:([A-Za-z_][A-Za-z_]\w*)|([GMTgmt])[ \t]*(\d+(?:\.\d+)?)?)?"
 )
 _EXPONENT = _ascii(r"[\d.][Ee][-+]?[\d.]")
-_CHECKSUM = _ascii(r".*\*\s*\d+\s*")
+_CHECKSUM = _ascii(r".*\*[ \t]*\d+[ \t]*")
 _TEXT = _ascii(r'"[^"]*"?|\{[^{}]*\}')
 _NEXT = _ascii(r"[GgMm]")
 _PASSED_OVER = _ascii(r"(?<![A-Za-z_=])[GgMm](?=[ \t]*\d)")
 _LETTER = _ascii(r"(?<![A-Za-z_=])[A-Za-z](?![A-Za-z_])")
-_PROGRAM_NUMBER = _ascii(r"\s*[Oo]\s*\d+\s*")
-_REMARK_ALONE = _ascii(r"\s*\([^()]*\)\s*")
+_PROGRAM_NUMBER = _ascii(r"[ \t]*[Oo][ \t]*\d+[ \t]*")
+_REMARK_ALONE = _ascii(r"[ \t]*\([^()]*\)[ \t]*")
 
 
 class Word(NamedTuple):
