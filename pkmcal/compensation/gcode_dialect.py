@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
+from functools import cache
 from typing import Literal
 
 AXES = frozenset("XYZABCUVW")
@@ -111,14 +112,17 @@ class Dialect:
 
     def name(self, letter: str, number: str) -> str:
         """A word as its table has it."""
-        if letter.upper() == "T":
-            return "T"
-        return letter.upper() + (number if self.exact else f"{float(number):g}" if number else "")
+        letter = letter.upper()
+        if letter == "T":
+            return letter
+        return letter + (number if self.exact or not number else _shortest(number))
 
     def meaning(self, name: str, letters: frozenset[str]) -> Meaning | None:
         """What a word with these letters means; None if the table has it not."""
-        of_these, then = self.by_letters.get(name, (frozenset(), None))
-        return self.words.get(name) if of_these.isdisjoint(letters) else then
+        of_these = self.by_letters.get(name)
+        if of_these is not None and not of_these[0].isdisjoint(letters):
+            return of_these[1]
+        return self.words.get(name)
 
     def e_is_relative(self, own: bool | None, axes: bool, last: bool | None) -> bool | None:
         """Whether E is relative; None where that is not stated, or versions differ.
@@ -132,9 +136,23 @@ class Dialect:
         last : bool or None
             Whether the last of G90, G91, M82 and M83 was G91 or M83.
         """
-        either = True if axes else own
-        found = {{"M82 M83": own, "either": either, "last": last}[rule] for rule in self.extrusion}
-        return found.pop() if len(found) == 1 else None
+        return _agreed(self.extrusion, own, axes, last)
+
+
+@cache
+def _agreed(
+    rules: tuple[Rule, ...], own: bool | None, axes: bool, last: bool | None
+) -> bool | None:
+    """What all rules say."""
+    said = {"M82 M83": own, "either": True if axes else own, "last": last}
+    found = {said[rule] for rule in rules}
+    return found.pop() if len(found) == 1 else None
+
+
+@cache
+def _shortest(number: str) -> str:
+    """A number without zeros that say nothing."""
+    return f"{float(number):g}"
 
 
 def table(*also: Mapping[str, Meaning], **names: str) -> dict[str, Meaning]:
