@@ -258,7 +258,7 @@ class Program:
     def _move(self, i: int, command: Command, state: _State) -> list[Move]:
         """The move of a G0 or G1, or of words alone; none if no axis moves."""
         words = command.words or {}
-        axes = {letter: word for letter, word in words.items() if letter in AXES}
+        axes = {letter: words[letter] for letter in words if letter in AXES}
         unknown = words.keys() - axes.keys() - self.dialect.letters
         if not command.name and (axes or not self.dialect.block):
             if not state.code or not self.dialect.block:
@@ -296,13 +296,16 @@ class Program:
                 per_turn=state.per_turn,
                 begins_times=begins_times,
                 behind=command.behind,
-                repeated="".join(
-                    f" {letter}{words[letter].value:.15g}"
-                    for letter in self.dialect.repeated
-                    if letter in words
-                ),
+                repeated=self._repeated(words),
             )
         ]
+
+    def _repeated(self, words: dict[str, Word]) -> str:
+        """The words that each part of a move has to state."""
+        if self.dialect.repeated.isdisjoint(words):
+            return ""
+        stated = sorted(self.dialect.repeated & words.keys())
+        return "".join(f" {letter}{words[letter].value:.15g}" for letter in stated)
 
     def _fresh(self, state: _State) -> tuple[float | None, ...] | None:
         """Where the controller is, if that is not where a move ended."""

@@ -51,7 +51,8 @@ class Writer:
             known = list(move.fresh) if not self._machine.joints else []
             self._last = known or [None] * len(self._last)
         pieces = []
-        before, done, fed = move.start, 0.0, False
+        before: Sequence[float] = move.start
+        done, fed = 0.0, False
         for k, (point, command, part) in enumerate(zip(points, commands, share, strict=True)):
             last = list(self._last)
             words = self._words(move, command, first=k == 0)

@@ -123,10 +123,9 @@ def _probe(
         Two probes: the firmware takes one.
     """
     offsets = ("x_offset", "y_offset", "z_offset")
-    known, others = [], []
-    for section in printer.sections(*offsets):
-        is_known = section in _PROBES or section.startswith(_NAMED_PROBE)
-        (known if is_known else others).append(section)
+    found = printer.sections(*offsets)
+    known = [each for each in found if each in _PROBES or each.startswith(_NAMED_PROBE)]
+    others = [each for each in found if each not in known]
     notes = tuple(
         f"{printer.place}: [{section}] has offsets and is no probe that is known: they were not"
         " read; state the offset of the probe in the robot file"
