@@ -39,7 +39,7 @@ CHECKS = (
         say=lambda found, seen: str(seen),
     ),
     Check(
-        name="late-readings", about="residuals follow the way that the machine came from the pose before",
+        name="late-readings", about="residuals follow the way from the pose before",
         unless=("grave",), run=lambda found: at_most_one(late(found)),
         level_of=lambda found, seen: "doubt" if seen.found else None,
         say=lambda found, seen: str(seen),
