@@ -46,7 +46,7 @@ CHECKS = (
     ),
     Check(
         name="two-machines", about="sets, sessions, halves or every second row want other numbers",
-        unless=("grave",), run=lambda found: at_most_one(apart(found)),
+        unless=("grave", "displaced-target"), run=lambda found: at_most_one(apart(found)),
         level_of=lambda found, seen: "doubt" if seen.found else None,
         say=lambda found, seen: str(seen),
     ),

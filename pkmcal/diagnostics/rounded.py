@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray
+from pkmcal.arrays import FloatArray
 from pkmcal.diagnostics.check import Check, Level, Remedy
 from pkmcal.display import displayed
 from pkmcal.estimation.coarse_readings import DITHERED, Coarse
@@ -17,7 +17,7 @@ from pkmcal.fitted.row_names import row_names
 from pkmcal.fitted.solution import Solution
 from pkmcal.statistics.distributions import chi2_tail
 from pkmcal.statistics.extremes import tied_extremes
-from pkmcal.statistics.steps import step_of
+from pkmcal.statistics.steps import LEAST_ROWS, step_of
 
 _CHANCE = 1e-3  # of residuals as small, were rounding errors independent
 _SIGNAL = 0.5  # of a step: deviation of what a fit changed, below which these errors are alike
@@ -31,7 +31,7 @@ _ROUNDED = 1e3  # times rounding errors of what is predicted
 def _nothing_measured(found: Solution) -> tuple[str, ...]:
     """How exactly every reading is what the nominal machine shows, in words; () if some are not."""
     start, equations = found.fit.start, found.fit.equations
-    if not equations.whitening.any_read or not start.ok:
+    if found.fit.uncertainty.mixed or not equations.whitening.any_read or not start.ok:
         return ()
     reach = _reach_of_actuators(found, start)
     steps = []
@@ -40,16 +40,23 @@ def _nothing_measured(found: Solution) -> tuple[str, ...]:
         values = m.values.reshape(residual.shape)
         own = np.array([step_of(values[:, k], unit) for k, unit in enumerate(m.units)])
         limit = 0.5 * own + reach[i] + _ROUNDED * rounding_of(m, start.robot.length)
-        off = residual - np.where(_constant(values), np.nanmedian(residual, axis=0), 0.0)
+        off = np.stack(
+            [_but_for_a_shift(*each) for each in zip(values.T, residual.T, strict=True)], axis=1
+        )
         if (np.abs(off) > limit).any():
             return ()
         steps += [_shown(step, unit) for step, unit in zip(own, m.units, strict=True) if step]
     return (max(steps, default=(0.0, ""))[1],)
 
 
-def _constant(values: FloatArray) -> BoolArray:
-    """Components (k,) of which one value was read everywhere: by a display too coarse to change."""
-    return np.array([len(np.unique(each[np.isfinite(each)])) == 1 for each in values.T])
+def _but_for_a_shift(values: FloatArray, residual: FloatArray) -> FloatArray:
+    """Residuals (N,) beside their median where all readings are equal: on a display, say.
+
+    A machine that is off by as much everywhere shows no more than that.
+    """
+    read = np.isfinite(values)
+    constant = read.sum() >= LEAST_ROWS and np.ptp(values[read]) == 0.0
+    return residual - np.median(residual[read]) if constant else residual
 
 
 def _shown(step: float, unit: str) -> tuple[float, str]:

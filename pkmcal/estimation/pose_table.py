@@ -147,9 +147,10 @@ def _commands(
 ) -> dict[str, FloatArray]:
     """What distinguishes the poses of rows, (N, n) each; those of second places come last."""
     noises = [m.actuator_sigma for m in sources if m.actuator_sigma is not None]
+    states = [m.drive_state for m in sets]
+    states += [m.other_drive_state for m in sets if m.other is not None]
     approach, tension = (
-        _of_all(each, [m.actuators for m in sources])
-        for each in zip(*(m.drive_state for m in sources), strict=True)
+        _of_all(each, [m.actuators for m in sources]) for each in zip(*states, strict=True)
     )
     given = {
         "actuators": np.concatenate(
