@@ -18,7 +18,8 @@ def _too_few(found: Solution) -> tuple[str, ...]:
     """What there is too little of: poses, equations, or freedom; the sentence on it."""
     equations = found.fit.uncertainty.equations
     n, count = len(equations.parameters), int(equations.components.sum())
-    if len(equations.actuators) == 1 and len(equations.rows) > 1:
+    one_place = (equations.actuators == equations.actuators[0]).all()
+    if one_place and len(equations.rows) > 1:
         return ("all rows have the same actuators: measure different poses",)
     if count < n and not len(found.fit.estimate.prior):
         return (
