@@ -73,10 +73,10 @@ def _columns(found: Solution) -> FloatArray:
     """How equations (M, 1) change with the share of the way that all readings are late by."""
     fit = found.fit
     sure, equations, end = fit.uncertainty, fit.equations, fit.end
-    way = visits_of(found).before - np.concatenate([m.actuators for m in equations.sets])
-    twists = end.machines.actuator_twists(end.states)[np.concatenate(equations.pose_of)]
+    way = visits_of(found).before - np.concatenate([m.actuators for m in equations.table.sets])
+    twists = end.machines.actuator_twists(end.states)[np.concatenate(equations.table.pose_of)]
     back = np.split(
-        (twists @ way[:, :, None])[:, :, 0], np.cumsum([len(m) for m in equations.sets])[:-1]
+        (twists @ way[:, :, None])[:, :, 0], np.cumsum([len(m) for m in equations.table.sets])[:-1]
     )
     seen = equations.prediction.predicted(end)
     parts = [each.by_twist @ own[:, :, None] for each, own in zip(seen, back, strict=True)]

@@ -35,7 +35,7 @@ def _nothing_measured(found: Solution) -> tuple[str, ...]:
         return ()
     reach = _reach_of_actuators(found, start)
     steps = []
-    for i, m in enumerate(equations.sets):
+    for i, m in enumerate(equations.table.sets):
         residual = start.residuals[i]
         values = m.values.reshape(residual.shape)
         own = np.array([step_of(values[:, k], unit) for k, unit in enumerate(m.units)])
@@ -67,12 +67,12 @@ def _shown(step: float, unit: str) -> tuple[float, str]:
 def _reach_of_actuators(found: Solution, at: Evaluation) -> list[FloatArray]:
     """How far half a step of all actuators moves each reading (N, k) of each set."""
     equations, units = found.fit.equations, at.robot.actuator_units
-    read = equations.actuators
+    read = equations.table.actuators
     half = np.array([0.5 * step_of(read[:, a], unit) for a, unit in enumerate(units)])
     by_actuators = at.machines.actuator_twists(at.states)
     reach = []
     for i, seen in enumerate(equations.prediction.predicted(at)):
-        moved = np.abs(seen.by_twist @ by_actuators[equations.pose_of[i]]) @ half
+        moved = np.abs(seen.by_twist @ by_actuators[equations.table.pose_of[i]]) @ half
         other = equations.table.other_of[i]
         if other is not None and seen.by_other is not None:
             moved += np.abs(seen.by_other @ by_actuators[other]) @ half
@@ -115,7 +115,7 @@ class CoarseSteps:
 def _coarse_steps(found: Solution) -> Iterator[CoarseSteps]:
     fit = found.fit
     for each in fit.uncertainty.coarse:
-        m = fit.equations.sets[each.set]
+        m = fit.equations.table.sets[each.set]
         yield CoarseSteps(
             m.components[each.component], m.units[each.component], each, _alike(found, each)
         )
@@ -185,8 +185,8 @@ class AtStop:
 def _at_stop(found: Solution) -> Iterator[AtStop]:
     equations = found.fit.equations
     first = 0
-    for m, pose in zip(equations.sets, equations.pose_of, strict=True):
-        numbers = equations.rows[first : first + len(m)]
+    for m, pose in zip(equations.table.sets, equations.table.pose_of, strict=True):
+        numbers = equations.table.rows[first : first + len(m)]
         first += len(m)
         values = m.values.reshape(len(m), -1)
         for k, (name, unit) in enumerate(zip(m.components, m.units, strict=True)):
@@ -201,7 +201,7 @@ def _at_stop(found: Solution) -> Iterator[AtStop]:
 def _stop_text(found: Solution, seen: AtStop) -> str:
     value, unit = displayed(seen.value, seen.unit)
     which = "highest" if seen.highest else "lowest"
-    where = row_names(found.fit.equations.datasets, seen.rows)
+    where = row_names(found.fit.equations.prediction.datasets, seen.rows)
     return (
         f"{len(seen.rows)} of {seen.count} readings of {seen.name} are {value:.6g} {unit}, the"
         f" {which} of all ({where}): was the instrument at its stop there? Leave them out,"

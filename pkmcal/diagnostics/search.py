@@ -17,9 +17,9 @@ def _nothing_determined(found: Solution) -> bool:
 def _too_few(found: Solution) -> tuple[str, ...]:
     """What there is too little of: poses, equations, or freedom; the sentence on it."""
     equations = found.fit.uncertainty.equations
-    n, count = len(equations.parameters), int(equations.components.sum())
-    one_place = (equations.actuators == equations.actuators[0]).all()
-    if one_place and len(equations.rows) > 1:
+    n, count = len(equations.parameters), int(equations.blocks.components.sum())
+    read = equations.table.actuators
+    if (read == read[0]).all() and len(equations.table.rows) > 1:
         return ("all rows have the same actuators: measure different poses",)
     if count < n and not len(found.fit.estimate.prior):
         return (

@@ -57,7 +57,7 @@ def apart(found: Solution) -> Apart | None:
         return None
     visits = visits_of(found)
     row = sure.labels.row
-    use = ~np.isin(sure.equations.rows, found.outliers)[row]
+    use = ~np.isin(sure.equations.table.rows, found.outliers)[row]
     key = numbered(visits.series[row][use], visits.visit[row][use], sure.labels.component[use])
     design = means(sure.fit.design[use], key)
     residual = means(sure.fit.residual[use, None], key)[:, 0]
@@ -79,9 +79,9 @@ def _groups(found: Solution, visits: Visits) -> Iterator[tuple[str, BoolArray]]:
     equations = found.fit.equations
     yield "every second pose", visits.visit % 2 == 1
     yield "the second half of the rows", 2 * visits.visit >= visits.visits
-    several = len(equations.sets) > 1
-    for i, m in enumerate(equations.sets):
-        mine = equations.set_of == i
+    several = len(equations.table.sets) > 1
+    for i, m in enumerate(equations.table.sets):
+        mine = equations.table.set_of == i
         if several and m.components:
             yield printable(m.file or f"measurements {i + 1}"), mine
         if m.session is None or found.sessions:

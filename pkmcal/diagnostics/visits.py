@@ -67,7 +67,7 @@ def visits_of(found: Solution) -> Visits:
 
 def _known(found: Solution) -> Iterator[tuple[FitData, int]]:
     """The sets that are fitted, then what of the same ones is held out, each with its number."""
-    yield from ((data, i) for i, data in enumerate(found.fit.equations.datasets))
+    yield from ((data, i) for i, data in enumerate(found.fit.equations.prediction.datasets))
     later = found.holdout_later
     if later is not None and found.holdout_drawn:
         yield from zip(later.data, later.like, strict=True)

@@ -59,7 +59,7 @@ def coarse_readings(
     variances = equations.whitening.variances(factors)
     component = _components(equations)
     found = []
-    for i, measured in enumerate(equations.sets):
+    for i, measured in enumerate(equations.table.sets):
         values = measured.values.reshape(len(measured), -1)
         for k, unit in enumerate(measured.units):
             mine = (named.set_of == i) & (component == k)
@@ -79,7 +79,7 @@ def coarse_readings(
 
 def _components(equations: Equations) -> IntArray:
     """Number of the component of each equation (M,) in its set."""
-    every = [np.tile(np.arange(len(m.components)), len(m)) for m in equations.sets]
+    every = [np.tile(np.arange(len(m.components)), len(m)) for m in equations.table.sets]
     component: IntArray = np.concatenate(every)[equations.whitening.present]
     return component
 
