@@ -10,6 +10,7 @@ from pkmcal.diagnostics import (
     machine,
     noise,
     priors,
+    rounded,
     rows,
     search,
     units,
@@ -18,6 +19,6 @@ from pkmcal.diagnostics.diagnosis import verified
 
 CHECKS = verified((
     *held_out.CHECKS, *units.CHECKS, *families.CHECKS, *machine.CHECKS, *search.CHECKS,
-    *rows.CHECKS, *noise.CHECKS, *priors.CHECKS, *course.CHECKS, *gain.CHECKS,
+    *rows.CHECKS, *rounded.CHECKS, *noise.CHECKS, *priors.CHECKS, *course.CHECKS, *gain.CHECKS,
 ))  # fmt: skip
 AT_ONCE = tuple(check for check in CHECKS if check.at_once)

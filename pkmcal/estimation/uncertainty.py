@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, IntArray
+from pkmcal.estimation.coarse_readings import Coarse, coarse_readings
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.estimate import Estimate
 from pkmcal.estimation.estimator import FEW, Estimator
@@ -58,6 +59,8 @@ class Uncertainty:
         `IterationState.noise`.
     slips : ndarray
         Of each set, `slipped`.
+    coarse : tuple of Coarse
+        Components whose residuals are no larger than the steps in which they were read.
     """
 
     labels: Labels
@@ -68,6 +71,7 @@ class Uncertainty:
     equations: Equations
     factors: FloatArray
     slips: FloatArray
+    coarse: tuple[Coarse, ...]
 
     @property
     def known(self) -> bool:
@@ -113,7 +117,7 @@ class Uncertainty:
     def by_cluster(self) -> FloatArray:
         """Covariance (p, p) in the basis that allows for whatever rows of a pose share."""
         prior = self.fit.prior.T @ self.fit.prior
-        matrix: FloatArray = self.covariance.sandwich.data + prior
+        matrix: FloatArray = self.covariance.by_cluster + prior
         return matrix
 
     def in_units(self, whitened: FloatArray) -> FloatArray:
@@ -150,6 +154,16 @@ class Uncertainty:
         """Variances in mm² of a length of each set; NaN where nothing shows them."""
         return tuple(self.noise_of(i) for i in range(len(self.equations.table.sets)))
 
+    def _rounding(self, i: int) -> float:
+        """The largest variance that rounding alone gives a length of set `i`, mm²."""
+        units = self.equations.table.sets[i].units
+        floors = [
+            each.floor
+            for each in self.coarse
+            if each.set == i and (units[each.component] == "mm" or "mm" not in units)
+        ]
+        return (self.equations.arcs[i] * max(floors, default=0.0)) ** 2
+
     @cached_property
     def excess(self) -> Noise:
         """Variances of an equation in units of what it was whitened by."""
@@ -169,7 +183,8 @@ class Uncertainty:
             return float(stated.mean()), 0.0
         mine = self.family_of(i, family) if family else self.lengths_of(i)
         retained = self.covariance.sandwich.retained[mine]
-        return noise(self.adjusted[mine], retained, numbered(self.fit.key[mine]))
+        total, shared = noise(self.adjusted[mine], retained, numbered(self.fit.key[mine]))
+        return max(total, self._rounding(i)), shared
 
     def stated_variances(self, i: int, family: int = 0) -> FloatArray | None:
         """`stated_variances` of set `i` in mm², of angles those of their arcs."""
@@ -239,21 +254,25 @@ def uncertainty(
     apart = None
     if classes is not None:
         apart = variance_components(fit, classes, _prior_residual(estimator, estimate))
+    found = covariance(
+        fit,
+        rule,
+        stated=not estimator.unstated.any(),
+        robust=estimator.loss != "linear",
+        components=apart,
+    )
+    coarse = coarse_readings(equations, named, fit, state.noise, found)
+    widening = max((each.widening for each in coarse), default=1.0)
     return Uncertainty(
         labels=named,
         fit=fit,
-        covariance=covariance(
-            fit,
-            rule,
-            stated=not estimator.unstated.any(),
-            robust=estimator.loss != "linear",
-            components=apart,
-        ),
+        covariance=found if widening == 1.0 else replace(found, widening=widening),
         reported=rates @ fit.back,
         unknown=estimator.unknown_noise(estimate),
         equations=equations,
         factors=state.noise,
         slips=slips,
+        coarse=coarse,
     )
 
 

@@ -355,6 +355,13 @@ class Reading:
                 value.setflags(write=False)
         return dataclasses.replace(self, **changes)  # type: ignore[type-var]
 
+    def approached(self, actuators: FloatArray, first: FloatArray | None) -> FloatArray | None:
+        """From where actuators (N, n) came to the second place of each row, (N, n).
+
+        `first` is from where they came to the first; None: not known.
+        """
+        return first
+
     # words ----------------------------------------------------------------------------------------
 
     def noun(self, count: int = 2) -> str:
