@@ -12,6 +12,7 @@ from pkmcal.diagnostics import (
     priors,
     rounded,
     rows,
+    sag,
     search,
     units,
 )
@@ -20,5 +21,6 @@ from pkmcal.diagnostics.diagnosis import verified
 CHECKS = verified((
     *held_out.CHECKS, *units.CHECKS, *families.CHECKS, *machine.CHECKS, *search.CHECKS,
     *rows.CHECKS, *rounded.CHECKS, *noise.CHECKS, *priors.CHECKS, *course.CHECKS, *gain.CHECKS,
+    *sag.CHECKS,
 ))  # fmt: skip
 AT_ONCE = tuple(check for check in CHECKS if check.at_once)
