@@ -23,6 +23,7 @@ from pkmcal.fitted.distances import Distances, distances
 from pkmcal.fitted.later import Later, OwnNumbers, compared, later
 from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.measurements.measurements import Measurements
+from pkmcal.result import ReadOnly
 from pkmcal.statistics.distributions import f_tail
 from pkmcal.statistics.holdout_test import RATIO, HoldoutTest, Lengths, holdout_test
 from pkmcal.statistics.linear_fit import numbered
@@ -36,7 +37,7 @@ _ODD = 0.01  # chance of naming any held-out row that is as far off as expected
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class HeldOut:
+class HeldOut(ReadOnly):
     """Errors of the points held out, mm; NaN where there are none.
 
     Attributes
