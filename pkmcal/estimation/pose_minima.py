@@ -53,7 +53,7 @@ def in_least_minima(
     robot = equations.parameters.robot
     if equations.system is None or not isinstance(robot, Robot):
         return evaluation
-    factors = np.ones(len(equations.unstated)) if noise is None else noise
+    factors = np.ones(len(equations.blocks.unstated)) if noise is None else noise
     freedom = _freedom(equations)
     squares = squares_of_poses(equations, evaluation, factors)
     odd, usual = _odd(squares, freedom)
@@ -78,7 +78,7 @@ def in_least_minima(
 
 def squares_of_poses(equations: Equations, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
     """Squared, whitened equations of each pose (K,); inf of poses that are not reached."""
-    blocks, found = equations.blocks, np.zeros(len(equations.actuators))
+    blocks, found = equations.blocks, np.zeros(len(equations.table.actuators))
     squares = blocks.squares(equations.residual(evaluation, noise))
     np.add.at(found, blocks.pose_of_block, squares)
     return np.where((evaluation.status == 0) & np.isfinite(found), found, np.inf)
@@ -87,7 +87,7 @@ def squares_of_poses(equations: Equations, evaluation: Evaluation, noise: FloatA
 def _freedom(equations: Equations) -> IntArray:
     """Equations of each pose (K,) beyond those that determine it."""
     blocks = equations.blocks
-    count = np.bincount(blocks.pose_of_block, blocks.components, len(equations.actuators))
+    count = np.bincount(blocks.pose_of_block, blocks.components, len(equations.table.actuators))
     return count.astype(np.intp)
 
 

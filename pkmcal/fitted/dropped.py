@@ -92,7 +92,7 @@ def outlying(estimator: Estimator, estimate: Estimate) -> BoolArray:
     odd = outliers(
         estimate.residual,
         estimate.design[:, :fitted],
-        equations.components,
+        equations.blocks.components,
         estimate.weights,
         estimate.prior @ estimate.half[:, :fitted],
     )
@@ -104,4 +104,6 @@ def robust_outliers(
 ) -> tuple[int, ...]:
     """Numbers of the rows that a robust fit from this start finds outlying."""
     estimator = estimator_at(equations, commanded, start, "cauchy")
-    return tuple(equations.rows[outlying(estimator, solved_in_least_minima(estimator))].tolist())
+    return tuple(
+        equations.table.rows[outlying(estimator, solved_in_least_minima(estimator))].tolist()
+    )

@@ -85,7 +85,7 @@ def test_sound_cables_are_not_called_slack_where_forward_ends_in_false_minima(
     off = found.values - [true.geometry[each] for each in found.free]
     assert np.abs(off / found.stderr).max() < 5.0
     poses = found.robot.forward(log.actuators, guess=at).pose
-    end = found.fit.end.pose[found.fit.equations.pose_of[0]]
+    end = found.fit.end.pose[found.fit.equations.table.pose_of[0]]
     np.testing.assert_allclose(end, poses, atol=1e-2)
 
 
