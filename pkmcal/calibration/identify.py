@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
+from typing import TypeVar, cast
 
 from pkmcal.arguments import earlier_keywords, words
-from pkmcal.arms.arm import SerialArm
 from pkmcal.calibration.asked import (
     EARLIER,
     ErrorWord,
@@ -38,13 +38,14 @@ from pkmcal.estimation.parameters import Asked, Bounds, Prior
 from pkmcal.exceptions import ArgumentError, CalibrationWarning
 from pkmcal.fitted.dropped import Drop, left_out
 from pkmcal.kinematics.calibratable import as_machine
-from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
+
+Given = TypeVar("Given", bound=Robot | SerialArm)
 
 
 @earlier_keywords(*EARLIER, now=now)
 def identify(
-    robot: Robot | SerialArm,
+    robot: Given,
     measurements: Measurements | Sequence[Measurements],
     free: str | Sequence[str] | None = None,
     *,
@@ -57,7 +58,7 @@ def identify(
     fix: str | Sequence[str] = (),
     drop: Drop = None,
     effects: Effects = (),
-) -> Identification:
+) -> Identification[Given]:
     """Find the geometry that agrees best with measurements.
 
     Weighted least squares on the measured quantities, through the forward kinematics and its
@@ -193,4 +194,4 @@ def identify(
     found = result(rows, fitted, sure, held, find_slack=not drop_slack)
     for text in found.warnings:
         warnings.warn(text, CalibrationWarning, stacklevel=3)  # of who called, beyond the adapter
-    return found
+    return cast("Identification[Given]", found)  # an arm for an arm
