@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import TypeVar, cast
 
 from pkmcal.arguments import earlier_keywords, words
+from pkmcal.arms.arm import SerialArm
 from pkmcal.calibration.asked import (
     EARLIER,
     ErrorWord,
@@ -38,6 +39,7 @@ from pkmcal.estimation.parameters import Asked, Bounds, Prior
 from pkmcal.exceptions import ArgumentError, CalibrationWarning
 from pkmcal.fitted.dropped import Drop, left_out
 from pkmcal.kinematics.calibratable import as_machine
+from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
 
 Given = TypeVar("Given", bound=Robot | SerialArm)
