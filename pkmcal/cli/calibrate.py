@@ -27,6 +27,7 @@ from pkmcal.cli.measured import (
     Columns,
     Controller,
     Ignore,
+    InvertPoses,
     JoinBy,
     ProbeOffset,
     Reading,
@@ -177,6 +178,7 @@ def calibrate(
     columns: Columns = None,
     units: Units = None,
     rotation: Rotation = None,
+    invert_poses: InvertPoses = False,
     probe_offset: ProbeOffset = None,
     tracker: Annotated[
         str | None,
@@ -225,7 +227,15 @@ def calibrate(
     given = pk.load(read.robot(robot))
     machine = as_machine(given)
     reading = Reading(
-        controller, join, ignore or (), rename or (), columns, units, rotation, probe_offset
+        controller,
+        join,
+        ignore or (),
+        rename or (),
+        columns,
+        units,
+        rotation,
+        probe_offset,
+        invert_poses,
     )
     with warnings.catch_warnings(record=True) as doubts:
         warnings.simplefilter("always", pk.CalibrationWarning)

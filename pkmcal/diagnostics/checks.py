@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from pkmcal.diagnostics import (
     course,
+    families,
     gain,
     held_out,
     machine,
     noise,
     priors,
+    rounded,
     rows,
     sag,
     search,
@@ -18,7 +20,8 @@ from pkmcal.diagnostics import (
 from pkmcal.diagnostics.diagnosis import verified
 
 CHECKS = verified((
-    *held_out.CHECKS, *units.CHECKS, *machine.CHECKS, *search.CHECKS, *rows.CHECKS, *noise.CHECKS,
-    *priors.CHECKS, *course.CHECKS, *gain.CHECKS, *sag.CHECKS, *waves.CHECKS,
+    *held_out.CHECKS, *units.CHECKS, *families.CHECKS, *machine.CHECKS, *search.CHECKS,
+    *rows.CHECKS, *rounded.CHECKS, *noise.CHECKS, *priors.CHECKS, *course.CHECKS, *gain.CHECKS,
+    *sag.CHECKS, *waves.CHECKS,
 ))  # fmt: skip
 AT_ONCE = tuple(check for check in CHECKS if check.at_once)
