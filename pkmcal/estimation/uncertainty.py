@@ -155,16 +155,15 @@ class Uncertainty:
         return tuple(self.noise_of(i) for i in range(len(self.equations.table.sets)))
 
     def _rounding(self, i: int, family: int) -> float:
-        """The largest variance that rounding alone gives a family of set `i`, mm²."""
-        mine = self.equations.table.sets[i].instrument.families[family : family + 1]
-        columns = [k for each in mine for k in each.columns]
+        """The largest variance that rounding alone gives a length of a family of set `i`, mm²."""
+        columns = self.equations.table.sets[i].instrument.families[family].columns
         arcs = self.equations.arcs[i]
         floors = [
-            float(arcs[each.component]) * each.floor
+            arcs[each.component] * each.floor
             for each in self.coarse
             if each.set == i and each.component in columns
         ]
-        return max(floors, default=0.0) ** 2
+        return float(max(floors, default=0.0)) ** 2
 
     @cached_property
     def excess(self) -> Noise:
