@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pkmcal.diagnostics import (
     course,
+    families,
     gain,
     held_out,
     machine,
@@ -11,13 +12,15 @@ from pkmcal.diagnostics import (
     priors,
     rounded,
     rows,
+    sag,
     search,
     units,
 )
 from pkmcal.diagnostics.diagnosis import verified
 
 CHECKS = verified((
-    *held_out.CHECKS, *units.CHECKS, *machine.CHECKS, *search.CHECKS, *rows.CHECKS, *rounded.CHECKS,
-    *noise.CHECKS, *priors.CHECKS, *course.CHECKS, *gain.CHECKS,
+    *held_out.CHECKS, *units.CHECKS, *families.CHECKS, *machine.CHECKS, *search.CHECKS,
+    *rows.CHECKS, *rounded.CHECKS, *noise.CHECKS, *priors.CHECKS, *course.CHECKS, *gain.CHECKS,
+    *sag.CHECKS,
 ))  # fmt: skip
 AT_ONCE = tuple(check for check in CHECKS if check.at_once)

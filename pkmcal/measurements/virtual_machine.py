@@ -15,7 +15,6 @@ from pkmcal.arrays import FloatArray
 from pkmcal.display import first_rows
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.kinematics.calibratable import ArmMachine, Solvable
-from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.former import OF_MEASURE, adapted
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.tracker import Tracker
@@ -168,8 +167,7 @@ class _Solving:
 
     def __call__(self, actuators: FloatArray, argument: str) -> Any:
         state = self.rows.other_drive_state if argument == "other" else self.rows.drive_state
-        moved = state.of(self.machine) if isinstance(self.machine, Robot) else self.machine
-        solved = moved.forward(actuators)
+        solved = state.of(self.machine).forward(actuators)
         failed = np.flatnonzero(~np.asarray(solved.ok)).tolist()
         if failed:
             raise ArgumentError(
