@@ -76,6 +76,7 @@ def test_a_machine_as_good_as_the_display_is_not_calibrated_by_it(size: float) -
     assert inside >= 0.85 * known
 
 
+@pytest.mark.filterwarnings("ignore:residuals are:pkmcal.CalibrationWarning")
 @pytest.mark.parametrize("stated", [None, 0.002])
 def test_no_deviation_is_less_than_rounding_alone_gives(stated: float | None) -> None:
     """The classical covariance with s/√12 as noise, from the Jacobian by differences."""
