@@ -358,6 +358,35 @@ class Measurements(Result):
         """
         write_measurements(self, path, comment)
 
+    @staticmethod
+    def from_pandas(frame: Any, robot: Any = None, **options: Any) -> Measurements:
+        """Read a pandas data frame with the columns of a file; mm and rad where none is said.
+
+        Parameters
+        ----------
+        frame : pandas.DataFrame
+            Columns named as in files: ``q1``, ``z``, ``"z [um]"`` …; the index is left out.
+        robot : Robot, optional
+            The machine that was measured.
+        **options
+            Those of `read_measurements`: `rename`, `units`, `kind` …
+
+        Raises
+        ------
+        ValueError, TypeError
+            As `read_measurements`; line 1 is that of the headings.
+
+        Examples
+        --------
+        >>> frame = pandas.DataFrame({"q1": [450.0], "q2": [451.0], "z [um]": [120.0]})
+        ... # doctest: +SKIP
+        >>> Measurements.from_pandas(frame).values  # doctest: +SKIP
+        array([0.12])
+        """
+        from pkmcal.measurements.data_frame import measurements_of_frame
+
+        return measurements_of_frame(frame, robot, **options)
+
     def _columns(self) -> dict[str, Any]:
         """As the columns of a file, but for the units, which are mm and rad."""
         columns: dict[str, Any] = {f"q{i + 1}": q for i, q in enumerate(self.actuators.T)}
