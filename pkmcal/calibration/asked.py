@@ -8,6 +8,7 @@ from typing import Any, Literal, cast
 from pkmcal.arguments import word, words
 from pkmcal.effects.effect import Effect
 from pkmcal.effects.expansion import Expansion
+from pkmcal.estimation.free_parameters import free_names
 from pkmcal.estimation.parameters import Known
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.fitted.datum import DATUM
@@ -34,21 +35,34 @@ def fixed_names(fix: str | Sequence[str]) -> tuple[tuple[str, ...], bool]:
     return tuple(name for name in names if name != DATUM), DATUM in names
 
 
-def effects_on(machine: Calibratable, effects: Any) -> tuple[Effect, ...]:
-    """Effects on this machine, each stated once."""
+def effects_on(
+    machine: Calibratable, free: str | Sequence[str] | None, effects: Any
+) -> tuple[Calibratable, str | Sequence[str] | None, tuple[Effect, ...]]:
+    """The machine with the numbers of its effects, what of it is free, and other effects on it."""
     if isinstance(effects, str) or not isinstance(effects, Iterable):
         effects = (effects,)
-    found: dict[str, Effect] = {}
-    for each in effects:
-        if not hasattr(each, "of_rows") and not hasattr(each, "of_machine"):
+    found: dict[str, Effect | None] = {}
+    given = tuple(effects)
+    for each in given:
+        if not any(hasattr(each, member) for member in ("of_rows", "of_machine", "on")):
             raise ArgumentTypeError(
                 f"effects: expected such as pk.Expansion(11.5e-6), found {each!r}"
             )
+    for each in (each for each in given if hasattr(each, "on")):
+        _once(each.name, found)
+        own = free_names(machine) if free is None else words("free", free)
+        machine, freed = each.on(machine)
+        free, found[each.name] = tuple(dict.fromkeys((*own, *freed))), None
+    for each in (each for each in given if not hasattr(each, "on")):
         effect = each.of_machine(machine) if hasattr(each, "of_machine") else each
-        if effect.name in found:
-            raise ArgumentError(f"effects: {effect.name} is stated more than once")
+        _once(effect.name, found)
         found[effect.name] = effect
-    return tuple(found.values())
+    return machine, free, tuple(each for each in found.values() if each is not None)
+
+
+def _once(name: str, found: Mapping[str, Effect | None]) -> None:
+    if name in found:
+        raise ArgumentError(f"effects: {name} is stated more than once")
 
 
 def now(before: dict[str, Any], others: dict[str, Any]) -> dict[str, Any]:

@@ -133,7 +133,8 @@ def identify(
         than needed; the rest of their rows is kept. They are `Identification.slack`; without the
         word a warning names them.
     effects : sequence of effects
-        What moves the machine off the pose that its geometry gives: ``[pk.Expansion(11.5e-6)]``.
+        What moves the machine off the pose that its geometry gives: ``[pk.Expansion(11.5e-6)]``;
+        ``[pk.Elasticity("offset*")]`` finds the compliances of legs beside what is free.
 
     Returns
     -------
@@ -168,8 +169,8 @@ def identify(
     machine = as_machine(robot)
     roles, own = unknown_roles(unknown), words("per_session", per_session)
     fixed, find_datum = fixed_names(fix)
+    machine, free, moving = effects_on(machine, free, effects)
     asked = Asked(free, prior, bounds, own, by_set(roles), fixed)
-    moving = effects_on(machine, effects)
     given = as_fit_data(machine, measurements, roles, bool(own), moving)
     named, drop_outliers, drop_slack = left_out(drop, sum(len(data.rows) for data in given))
     rows = prepare(machine, given, holdout, named, bool(own))

@@ -21,6 +21,7 @@ from pkmcal.cli.geometry_options import (
     read_prior,
 )
 from pkmcal.cli.inputs import Inputs
+from pkmcal.cli.load_options import ElasticNumbers, yielding_effects
 from pkmcal.cli.measured import (
     Columns,
     Controller,
@@ -147,6 +148,7 @@ def calibrate(
             " other parts, or separate them with commas.",
         ),
     ] = None,
+    elasticity: ElasticNumbers = None,
     drop: Annotated[
         list[str] | None,
         typer.Option(
@@ -260,6 +262,7 @@ def calibrate(
     found_rows: dict[Found, bool] = {"outliers": drop_outliers, "slack": drop_slack}
     held_by_datum = ["datum"] if word("--datum", datum, ("none", "auto")) == "auto" else []
     coefficients = read_coefficients("--expansion", expansion or [])
+    expanding = [] if coefficients is None else [pk.Expansion(coefficients)]
     with progress("identifying"), warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # the summary has them
         found = pk.identify(
@@ -274,7 +277,7 @@ def calibrate(
             per_session=anew,
             fix=[*fixed, *held_by_datum],
             drop=[*dropped, *(each for each, asked in found_rows.items() if asked)],
-            effects=[] if coefficients is None else [pk.Expansion(coefficients)],
+            effects=[*expanding, *yielding_effects(elasticity)],
         )
     if output is not None:
         with progress("picture"), output.draft() as draft:

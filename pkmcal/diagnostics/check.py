@@ -27,6 +27,7 @@ _SEVERAL = (
     "fix",
     "per_session",
     "unknown",
+    "effects",
 )  # arguments that take more beside what they have
 
 
@@ -66,6 +67,8 @@ class Remedy:
     def option(self) -> str | None:
         """The option of ``pkmcal calibrate``; None where it has none."""
         several = isinstance(self.value, tuple)
+        if several and all(hasattr(each, "option") for each in self.value):
+            return " ".join(each.option for each in self.value)
         if not several and (self.argument, self.value) in _OPTIONS:
             return _OPTIONS[self.argument, self.value]
         name = f"--{self.argument.replace('_', '-')}"

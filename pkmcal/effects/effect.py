@@ -71,4 +71,15 @@ class StatedEffect(Protocol):
         """The effect on this machine."""
 
 
-Effects = Effect | StatedEffect | Sequence[Effect | StatedEffect]
+class OwnNumbers(Protocol):
+    """An effect whose numbers are some of the geometry, by which the machine solves its poses."""
+
+    @property
+    def name(self) -> str:
+        """As messages say it."""
+
+    def on(self, machine: Any) -> tuple[Any, tuple[str, ...]]:
+        """The machine that has these numbers, and the names of those to be estimated."""
+
+
+Effects = Effect | StatedEffect | OwnNumbers | Sequence[Effect | StatedEffect | OwnNumbers]

@@ -139,8 +139,6 @@ def _of_table(top: Table, limbs: Limbs, parameters: Parameters) -> Iterator[tupl
                 given = of[at]
                 spring, per_length = _growing(of, spring, parameters)
             entry = parameters.entry(parameters.term(of, at, given, unit))
-            if entry.value < 0.0:
-                of.fail(at, f"must not be negative, found {shown(given)}")
             yield key, _Yields(spring, entry, per_length)
 
 

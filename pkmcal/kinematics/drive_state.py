@@ -1,4 +1,4 @@
-"""What drives depend on beside their readings: from where they came, and under which tension."""
+"""What a machine depends on beside what its actuators read: how these came there, and its load."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ from typing import NamedTuple
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.geometry.carried import Load
 from pkmcal.kinematics.robot import Robot
 
 
 class DriveState(NamedTuple):
-    """Of each actuator at N rows; None where nothing is known.
+    """Of each actuator, and of the platform, at N rows; None where nothing is known.
 
     Attributes
     ----------
@@ -19,10 +20,14 @@ class DriveState(NamedTuple):
         +1 where its reading had grown, -1 where it had fallen, 0 where that is not known.
     tension : ndarray (N, n) or None
         Of what it drives, N.
+    load : ndarray (N, 10) or None
+        What the platform carries, as `pkmcal.geometry.carried.Load.rows` has it. A machine of which
+        nothing yields does not follow it.
     """
 
     approach: FloatArray | None = None
     tension: FloatArray | None = None
+    load: FloatArray | None = None
 
     def at(self, rows: IntArray | np.intp) -> DriveState:
         """That of some rows, or of one."""
@@ -32,4 +37,8 @@ class DriveState(NamedTuple):
         """The robot in this state."""
         if self.approach is not None:
             robot = robot.approaching(self.approach)
-        return robot if self.tension is None else robot.tensioned(self.tension)
+        if self.tension is not None:
+            robot = robot.tensioned(self.tension)
+        if self.load is None or robot.rigid is robot:
+            return robot
+        return robot.under(Load.of_rows(self.load))

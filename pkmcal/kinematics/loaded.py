@@ -143,11 +143,11 @@ class LoadedMachine(CoreMachine):
     def forces(self, slots: FloatArray, pose: FloatArray, q: FloatArray) -> FloatArray:
         """What pulls at each number that yields, N or N mm, (N, s), at poses (N, 6)."""
         inside = self.under_load(slots, pose, q)
-        return self._forces(slots, pose, q, inside, self._numbers(slots), self.carried)
+        return self._forces(slots, pose, q, inside, self.numbers(slots), self.carried)
 
     def compliances(self, slots: FloatArray, q: FloatArray) -> FloatArray:
         """Compliance of each number that yields, mm/N or rad/(N mm), (N, s), at q (N, n)."""
-        numbers = self._numbers(slots)
+        numbers = self.numbers(slots)
         found = np.array(
             np.broadcast_to(numbers[..., self._compliance], (len(q), len(self._compliance)))
         )
@@ -162,7 +162,7 @@ class LoadedMachine(CoreMachine):
         inside = self.under_load(slots, pose, q)
         return self.inner.error_jacobian(inside, pose, q, self._columns, twists=True)
 
-    def _numbers(self, slots: FloatArray) -> FloatArray:
+    def numbers(self, slots: FloatArray) -> FloatArray:
         """The numbers of `Elastic`, (k,) or (N, k)."""
         return slots[..., 0, self._width :]
 
@@ -249,7 +249,7 @@ class LoadedMachine(CoreMachine):
         """The machine, its numbers, what it carries and its geometry, for some rows of a call."""
         mine = slots[rows] if slots.ndim == 3 else slots
         at = self.of_rows(rows)
-        return at, self._numbers(mine), at.carried, mine
+        return at, self.numbers(mine), at.carried, mine
 
     def of_rows(self, rows: IntArray) -> LoadedMachine:
         """The same with the state that it has in some rows of a call."""
@@ -316,7 +316,7 @@ class LoadedMachine(CoreMachine):
     ) -> None:
         """`forward` by the core, and row by row of what it does not settle."""
         assert isinstance(self.inner, Machine)
-        rigid, numbers = self.rigid(slots), self._numbers(slots)
+        rigid, numbers = self.rigid(slots), self.numbers(slots)
         compliance = numbers[self._compliance]
         if self._growing:
             compliance = self.compliances(slots, q)
@@ -430,7 +430,7 @@ class LoadedMachine(CoreMachine):
         places: IntArray,
     ) -> FloatArray:
         """How far numbers give more, (N, s, k), by numbers of `Elastic` at places (k,)."""
-        numbers = self._numbers(slots)
+        numbers = self.numbers(slots)
         force = self._forces(slots, pose, q, inside, numbers, self.carried)
         compliance = self.compliances(slots, q)
         out = np.zeros((len(pose), len(self._columns), len(places)))
@@ -453,7 +453,7 @@ class LoadedMachine(CoreMachine):
     ) -> FloatArray:
         """Derivative of the forces (N, s) by a number of what pulls, by central differences."""
         ends = []
-        numbers = self._numbers(slots)
+        numbers = self.numbers(slots)
         step = _STEP * np.maximum(1.0, np.abs(numbers[..., place]).max())
         for sign in (1.0, -1.0):
             there = numbers.copy()
