@@ -70,7 +70,7 @@ class Remedy:
     def option(self) -> str | None:
         """The option of ``pkmcal calibrate``; None where it has none."""
         several = isinstance(self.value, tuple)
-        if several and all(hasattr(each, "option") for each in self.value):
+        if several and self.value and all(hasattr(each, "option") for each in self.value):
             return " ".join(each.option for each in self.value)
         if not several and (self.argument, self.value) in _OPTIONS:
             return _OPTIONS[self.argument, self.value]
