@@ -41,7 +41,7 @@ def _ignored(found: Solution) -> tuple[IgnoredLoads, ...]:
     fit, robot = found.fit, found.fit.parameters.robot
     if isinstance(robot, Robot) and robot.model.elastic is not None:
         return ()
-    if not any(m.load is not None and m.load.any() for m in fit.equations.sets):
+    if not any(m.load is not None and m.load.any() for m in fit.equations.table.sets):
         return ()
     sure = fit.uncertainty
     if not isinstance(robot, Robot) or sure.mixed or sure.rounded:
@@ -70,7 +70,7 @@ def _ignored_level(found: Solution, seen: IgnoredLoads) -> Level:
 
 
 def _ignored_text(found: Solution, seen: IgnoredLoads) -> str:
-    masses = np.hstack([m.load[:, 0] for m in found.fit.equations.sets if m.load is not None])
+    masses = np.hstack([m.load[:, 0] for m in found.fit.equations.table.sets if m.load is not None])
     least, most = masses.min(), masses.max()
     carried = "loads of the rows" if not most else f"loads of the rows, {least:g} to {most:g} kg,"
     if seen.chance < CHANCE:
@@ -90,7 +90,7 @@ def _compliances(found: Solution) -> Iterator[tuple[str, float, float]]:
 
 def _alike(found: Solution) -> tuple[float, ...]:
     """Largest relative deviation of a compliance where all rows carried alike."""
-    loads = [m.load for m in found.fit.equations.sets]
+    loads = [m.load for m in found.fit.equations.table.sets]
     stated = np.vstack([each for each in loads if each is not None] or [np.zeros((1, 10))])
     alike = all(each is None for each in loads) or all(each is not None for each in loads)
     unsure = [sigma / abs(value) for _, value, sigma in _compliances(found) if value]
