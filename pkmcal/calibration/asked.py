@@ -6,9 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Literal, cast
 
 from pkmcal.arguments import word, words
-from pkmcal.effects.effect import Effect
+from pkmcal.effects.effect import Changed, Effect
 from pkmcal.effects.expansion import Expansion
-from pkmcal.estimation.free_parameters import free_names
 from pkmcal.estimation.loss import LIMITS, LossName
 from pkmcal.estimation.parameters import Known
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
@@ -52,33 +51,32 @@ def fixed_names(fix: str | Sequence[str]) -> tuple[tuple[str, ...], bool]:
 
 
 def effects_on(
-    machine: Calibratable, free: str | Sequence[str] | None, effects: Any
-) -> tuple[Calibratable, str | Sequence[str] | None, tuple[Effect, ...]]:
-    """The machine with the numbers of its effects, what of it is free, and other effects on it."""
+    machine: Calibratable, effects: Any
+) -> tuple[Calibratable, tuple[Effect, ...], dict[str, float]]:
+    """The machine with the numbers of effects, the other effects on it, each stated once.
+
+    And which numbers effects free, with the deviation of what is known of each.
+    """
     if isinstance(effects, str) or not isinstance(effects, Iterable):
         effects = (effects,)
-    found: dict[str, Effect | None] = {}
-    given = tuple(effects)
-    for each in given:
-        if not any(hasattr(each, member) for member in ("of_rows", "of_machine", "on")):
+    found: dict[str, Effect] = {}
+    names: list[str] = []
+    free: dict[str, float] = {}
+    for each in effects:
+        if not hasattr(each, "of_rows") and not hasattr(each, "of_machine"):
             raise ArgumentTypeError(
                 f"effects: expected such as pk.Expansion(11.5e-6), found {each!r}"
             )
-    for each in (each for each in given if hasattr(each, "on")):
-        _once(each.name, found)
-        own = free_names(machine) if free is None else words("free", free)
-        machine, freed = each.on(machine)
-        free, found[each.name] = tuple(dict.fromkeys((*own, *freed))), None
-    for each in (each for each in given if not hasattr(each, "on")):
         effect = each.of_machine(machine) if hasattr(each, "of_machine") else each
-        _once(effect.name, found)
-        found[effect.name] = effect
-    return machine, free, tuple(each for each in found.values() if each is not None)
-
-
-def _once(name: str, found: Mapping[str, Effect | None]) -> None:
-    if name in found:
-        raise ArgumentError(f"effects: {name} is stated more than once")
+        if effect.name in names:
+            raise ArgumentError(f"effects: {effect.name} is stated more than once")
+        names.append(effect.name)
+        if isinstance(effect, Changed):
+            machine = effect.machine
+            free |= effect.free
+        else:
+            found[effect.name] = effect
+    return machine, tuple(found.values()), free
 
 
 def now(before: dict[str, Any], others: dict[str, Any]) -> dict[str, Any]:

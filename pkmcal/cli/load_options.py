@@ -8,7 +8,6 @@ from typing import Annotated
 import typer
 
 from pkmcal.cli.rows import numbers_on_line
-from pkmcal.effects.elasticity import Elasticity
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.number_text import typed
 from pkmcal.geometry.carried import Load
@@ -39,21 +38,6 @@ Yielding = Annotated[
         help="What yields where the robot file does not say: 'offset*=5e-5', mm/N or rad/(N mm).",
     ),
 ]
-ElasticNumbers = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--elasticity",
-        metavar="NAME",
-        help="Find compliances of these numbers, 'offset*' of legs and screws, by loads of the"
-        " rows: columns payload, force.x … Repeat it for others, or separate them with commas.",
-    ),
-]
-
-
-def yielding_effects(names: list[str] | None) -> list[Elasticity]:
-    """The effect of the numbers that the option names; none without it."""
-    parts = [part.strip() for text in names or () for part in text.split(",")]
-    return [Elasticity(parts)] if parts else []
 
 
 def carrying(

@@ -54,7 +54,7 @@ def _ignored(found: Solution) -> tuple[IgnoredLoads, ...]:
 
 def _by_compliances(fit: Fit, robot: Robot) -> FloatArray:
     """How equations (M, s) change with compliances of legs and screws that are held at 0."""
-    soft, freed = _OF_LEGS.on(robot)
+    _, soft, freed = _OF_LEGS.of_machine(robot)
     places = [soft.geometry.names.index(name) for name in freed]
     table, sure, parts = fit.equations.table, fit.uncertainty, []
     predicted = fit.equations.prediction.predicted(fit.end)
@@ -76,7 +76,7 @@ def _ignored_text(found: Solution, seen: IgnoredLoads) -> str:
     if seen.chance < CHANCE:
         return (
             f"residuals follow the {carried} ({chance_text(seen.chance)}): the machine yields; find"
-            " its compliances, --elasticity 'offset*' (effects=[pk.Elasticity('offset*')])"
+            " its compliances, --effects 'elasticity=offset*' (effects=[pk.Elasticity('offset*')])"
         )
     return f"the {carried} are not taken into account: nothing of the machine yields"
 

@@ -11,7 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+import numpy as np
+
 from pkmcal.arguments import flag, words
+from pkmcal.effects.effect import Changed
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.elastic import COMPLIANCE, PER_LENGTH
 from pkmcal.geometry.yielding import elastic_numbers
@@ -57,11 +60,11 @@ class Elasticity:
 
     @property
     def option(self) -> str:
-        """As the command line says it."""
-        return " ".join(f"--elasticity {name!r}" for name in words("numbers", self.numbers))
+        """As ``--effects`` has it."""
+        return f"elasticity={':'.join(words('numbers', self.numbers))}"
 
-    def on(self, machine: Any) -> tuple[Robot, tuple[str, ...]]:
-        """The machine that yields, and the names of its compliances.
+    def of_machine(self, machine: Any) -> Changed:
+        """The machine that yields, its compliances free.
 
         Raises
         ------
@@ -77,4 +80,5 @@ class Elasticity:
         freed = [COMPLIANCE + name for name in compliance]
         if self.per_length:
             freed += [name + PER_LENGTH for name in freed]
-        return machine.yielding(compliance, per_length=self.per_length), tuple(freed)
+        yielding = machine.yielding(compliance, per_length=self.per_length)
+        return Changed(self.name, yielding, dict.fromkeys(freed, np.inf))

@@ -14,7 +14,7 @@ import numpy as np
 from pkmcal.arguments import did_you_mean, shown
 from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.estimation.fit_data import PLACE, FitData, Numbers
-from pkmcal.estimation.parameters import FRAME, Asked, Bounds, Parameters, Prior
+from pkmcal.estimation.parameters import FRAME, Asked, Bounds, Parameters
 from pkmcal.estimation.prior_functions import is_function, prior_functions
 from pkmcal.estimation.scales import unit_scales
 from pkmcal.estimation.sessions import Scope, label, matches, scopes
@@ -80,7 +80,7 @@ def parameters(
         units=units,
         start=values,
         scale=scale,
-        prior=_prior(asked.prior, names, scale, count, strict=like is None),
+        prior=_prior(asked, names, scale, count, strict=like is None),
         lower=lower,
         upper=upper,
         number_of=number_of,
@@ -111,24 +111,21 @@ def _scale(of_unit: Mapping[str, float], name: str, unit: str) -> float:
     return of_unit[unit]
 
 
-def free_names(robot: Calibratable) -> tuple[str, ...]:
-    """What is free by default; an error where nothing is."""
-    if not robot.model.free:
-        stems = dict.fromkeys(re.sub(r"[0-9].*", "*", name) for name in robot.geometry.names)
-        raise ArgumentError(
-            f"free: {robot.name} declares no free parameters, name some of {', '.join(stems)};"
-            " or state them in its file: [calibration] free = [...]"
-        )
-    return robot.model.free
-
-
 def _free_places(robot: Calibratable, asked: Asked) -> IntArray:
     """Places of the free numbers in the geometry's values."""
-    geometry = robot.geometry
-    free = free_names(robot) if asked.free is None else asked.free
+    geometry, free = robot.geometry, asked.free
+    if free is None:
+        free = robot.model.free
+        if not free:
+            stems = dict.fromkeys(re.sub(r"[0-9].*", "*", name) for name in geometry.names)
+            raise ArgumentError(
+                f"free: {robot.name} declares no free parameters, name some of {', '.join(stems)};"
+                " or state them in its file: [calibration] free = [...]"
+            )
     chosen = geometry.match(free, "free")
     if not chosen:
         raise ArgumentError("free: name at least one parameter")
+    chosen = list(dict.fromkeys([*chosen, *asked.of_effects]))
     if asked.fix:
         held = geometry.match(asked.fix, "fix")
         chosen = [name for name in chosen if name not in held]
@@ -213,21 +210,25 @@ def _matching(argument: str, pattern: object, names: Sequence[str], strict: bool
 
 
 def _prior(
-    prior: Prior, names: Sequence[str], scale: FloatArray, of_machine: int, strict: bool
+    asked: Asked, names: Sequence[str], scale: FloatArray, of_machine: int, strict: bool
 ) -> FloatArray:
+    """What is known of each parameter: as effects have it, but where `prior` names it."""
+    prior = asked.prior
     sigma = np.full(len(names), np.inf)
-    if prior is None:
-        return sigma
+    of_effects = [asked.of_effects.get(name.partition("@")[0], np.inf) for name in names]
+    if isinstance(prior, Mapping):
+        sigma[:] = of_effects
     if isinstance(prior, Mapping):
         for pattern, value in prior.items():
             if is_function(pattern, value):
                 continue
             hits = _matching("prior", pattern, names, strict)
             sigma[hits] = _positive(f"prior of {pattern}", value)
-    else:
+        return sigma
+    if prior is not None:
         sigma[:of_machine] = _positive("prior", prior) * scale[:of_machine]
         sigma[[not is_kinematic(name) for name in names]] = np.inf  # forces are no lengths
-    return sigma
+    return np.where(np.isfinite(of_effects), of_effects, sigma)
 
 
 def _positive(what: str, value: object) -> float:

@@ -14,6 +14,7 @@ from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
 
 _GRAVITY = 9.80665  # m/s²
+_WEIGHT = 100.0  # N, of a link of an arm, more or less
 _SOFTNESS = 1e-3  # of the size: the sag by which a compliance is taken that is not known yet
 
 
@@ -29,6 +30,7 @@ def unit_scales(robot: Calibratable, sets: Sequence[Measurements]) -> dict[str, 
     found["1/mm2"] = found["1/mm"] / length
     pull = max(_pull(robot, each) for each in sets)
     found |= {"1/N": 1.0 / travel / pull, "N": pull / length}
+    found["rad/(N mm)"] = 1.0 / length / (_WEIGHT * length)
     if not isinstance(robot, Robot) or robot.model.elastic is None:
         return found
     found |= {"mm/N": 1.0 / pull, "rad/(N mm)": 1.0 / pull / length**2}

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.geometry.carried import Load
+from pkmcal.kinematics.calibratable import ArmMachine
 from pkmcal.kinematics.robot import Robot
+
+M = TypeVar("M")
 
 
 class DriveState(NamedTuple):
@@ -33,12 +36,13 @@ class DriveState(NamedTuple):
         """That of some rows, or of one."""
         return DriveState(*(None if each is None else each[rows] for each in self))
 
-    def of(self, robot: Robot) -> Robot:
-        """The robot in this state."""
-        if self.approach is not None:
-            robot = robot.approaching(self.approach)
-        if self.tension is not None:
-            robot = robot.tensioned(self.tension)
-        if self.load is None or robot.rigid is robot:
-            return robot
-        return robot.under(Load.of_rows(self.load))
+    def of(self, machine: M) -> M:
+        """The machine in this state: a robot, or an arm, on which tension and load do nothing."""
+        found: Any = machine
+        if isinstance(found, Robot | ArmMachine) and self.approach is not None:
+            found = found.approaching(self.approach)
+        if isinstance(found, Robot) and self.tension is not None:
+            found = found.tensioned(self.tension)
+        if isinstance(found, Robot) and self.load is not None and found.rigid is not found:
+            found = found.under(Load.of_rows(self.load))
+        return cast(M, found)

@@ -73,7 +73,7 @@ def test_the_search_ends_at_the_minimum_of_the_exact_model() -> None:
     load = pushed(len(q), 800.0)
     rows = pk.VirtualMachine(true, NOISE, seed=2).measure(q, "position", load=load)
     found = pk.identify(robot, rows, free="offset*", effects=[pk.Elasticity()])
-    soft, freed = pk.Elasticity().on(robot)
+    _, soft, freed = pk.Elasticity().of_machine(robot)
     names = [*(f"offset{i}" for i in range(1, 7)), *freed]
 
     def off(x: FloatArray) -> FloatArray:
@@ -159,7 +159,7 @@ def test_loads_that_nothing_follows_are_named_as_the_cause() -> None:
         found = pk.identify(robot, rows)
     assert found.verdict.state == "doubtful"
     assert "residuals follow the loads of the rows, 0 to 80 kg" in found.verdict.reasons[0]
-    assert "--elasticity 'offset*'" in found.verdict.reasons[0]
+    assert "--effects 'elasticity=offset*'" in found.verdict.reasons[0]
 
 
 def test_loads_of_a_stiff_machine_are_only_mentioned() -> None:
@@ -267,4 +267,4 @@ def test_an_arm_and_an_effect_stated_twice_are_refused() -> None:
     robot = pk.load("hexapod")
     rows = pk.VirtualMachine(robot, NOISE).measure(twice(robot, 10), "pose")
     with pytest.raises(ValueError, match="elasticity is stated more than once"):
-        pk.identify(robot, rows, effects=[pk.Elasticity(), pk.Elasticity("rod*")])
+        pk.identify(robot, rows, effects=[pk.Elasticity(), pk.Elasticity("base*")])
