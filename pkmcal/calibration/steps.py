@@ -154,7 +154,7 @@ class Problem:
 def begin(rows: Rows, chosen: Parameters) -> Problem:
     """State the problem at the nominal machine."""
     problem = Problem(*begun(rows.fitted, chosen, rows.missing))
-    if rows.held and problem.equations.closures.cells:
+    if rows.held and problem.equations.machines.cells:
         raise ArgumentError("holdout: rows whose tensions are unknown are all fitted: leave it out")
     _require_predictions(problem)
     return problem
