@@ -19,7 +19,7 @@ from pkmcal.estimation.row_states import RowStates
 from pkmcal.estimation.sessions import NONE, by_parameters
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.calibratable import Calibratable
-from pkmcal.readings import joint_angles, orientation
+from pkmcal.readings import orientation
 from pkmcal.readings.reading import At, Predicted, joined
 
 _BATCH = 1024  # rows whose derivatives by the parameters are made at once, as many as caches hold
@@ -116,7 +116,7 @@ class Prediction:
         guess = np.tile(self.parameters.robot.home, (len(table.actuators), 1))
         for i, (measured, place) in enumerate(zip(table.sets, table.pose_of, strict=True)):
             elsewhere = self.datasets[i].framed or "tool" in self.columns[i]
-            if measured.kind in ("pose", "position") and not elsewhere:
+            if measured.instrument.is_place and not elsewhere:
                 known = np.isfinite(measured.values)
                 ever = np.flatnonzero(known.any(axis=0))  # not across a plane, say
                 read = np.flatnonzero(known[:, ever].all(axis=1))
@@ -139,8 +139,7 @@ class Prediction:
                 " no surplus actuators; found others"
             )
         for m in self.table.sets:
-            follows = m.joint and joint_angles.follows_pose(self.parameters.robot, m.joint)
-            if m.kind in ("between", "angle") and not follows:
+            if not m.instrument.follows_pose(self.parameters.robot):
                 raise ArgumentError(
                     f"measurements: readings of kind {m.kind!r} need poses that follow from the"
                     " actuators: no actuator_sigma, and no surplus actuators"
