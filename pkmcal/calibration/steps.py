@@ -25,6 +25,7 @@ from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.free_parameters import parameters
 from pkmcal.estimation.loss import LossName
 from pkmcal.estimation.parameters import Asked, Parameters
+from pkmcal.estimation.pose_minima import solved_in_least_minima
 from pkmcal.estimation.starts import known_distances
 from pkmcal.estimation.uncertainty import (
     unlike_components,
@@ -153,7 +154,7 @@ def without_slack(problem: Problem) -> Problem:
 def solve(problem: Problem, loss: LossName, rule: CovarianceRule) -> Fit:
     """Search from the start of the problem; an error where rows are not reached."""
     estimator = estimator_at(problem.equations, problem.exact, problem.start, loss)
-    return Fit(problem, estimator, estimator.solve(), rule=rule)
+    return Fit(problem, estimator, solved_in_least_minima(estimator), rule=rule)
 
 
 def with_datum(fit: Fit, rows: Rows, asked: Asked) -> Fit:

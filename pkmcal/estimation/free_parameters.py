@@ -14,7 +14,7 @@ import numpy as np
 from pkmcal.arguments import did_you_mean, shown
 from pkmcal.arrays import FloatArray, IntArray, mm_per_unit
 from pkmcal.estimation.fit_data import PLACE, FitData, Numbers
-from pkmcal.estimation.parameters import FRAME, Asked, Bounds, Parameters, Prior
+from pkmcal.estimation.parameters import FRAME, Asked, Bounds, Parameters
 from pkmcal.estimation.prior_functions import is_function, prior_functions
 from pkmcal.estimation.sessions import Scope, label, matches, scopes
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
@@ -23,6 +23,7 @@ from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
 
+_WEIGHT = 100.0  # N, of a link of an arm, more or less
 _LEAST_PRIOR, _MOST_PRIOR = 1e-15, 1e15  # mm or rad, whose squares are numbers
 
 
@@ -66,6 +67,7 @@ def parameters(
     of_unit["1/mm2"] = of_unit["1/mm"] / robot.length
     pull = max(_pull(robot, data.measured) for data in datasets)
     of_unit |= {"1/N": 1.0 / travel / pull, "N": pull / robot.length}
+    of_unit["rad/(N mm)"] = 1.0 / robot.length / (_WEIGHT * robot.length)
     of_number = [np.full(len(places), np.nan)]  # where the unit says the scale
     of_number += [
         np.full(len(each.names), np.nan) if each.scale is None else each.scale
@@ -86,7 +88,7 @@ def parameters(
         units=units,
         start=values,
         scale=scale,
-        prior=_prior(asked.prior, names, scale, count, strict=like is None),
+        prior=_prior(asked, names, scale, count, strict=like is None),
         lower=lower,
         upper=upper,
         number_of=number_of,
@@ -131,6 +133,7 @@ def _free_places(robot: Calibratable, asked: Asked) -> IntArray:
     chosen = geometry.match(free, "free")
     if not chosen:
         raise ArgumentError("free: name at least one parameter")
+    chosen = list(dict.fromkeys([*chosen, *asked.of_effects]))
     if asked.fix:
         held = geometry.match(asked.fix, "fix")
         chosen = [name for name in chosen if name not in held]
@@ -230,21 +233,25 @@ def _matching(argument: str, pattern: object, names: Sequence[str], strict: bool
 
 
 def _prior(
-    prior: Prior, names: Sequence[str], scale: FloatArray, of_machine: int, strict: bool
+    asked: Asked, names: Sequence[str], scale: FloatArray, of_machine: int, strict: bool
 ) -> FloatArray:
+    """What is known of each parameter: as effects have it, but where `prior` names it."""
+    prior = asked.prior
     sigma = np.full(len(names), np.inf)
-    if prior is None:
-        return sigma
+    of_effects = [asked.of_effects.get(name.partition("@")[0], np.inf) for name in names]
+    if isinstance(prior, Mapping):
+        sigma[:] = of_effects
     if isinstance(prior, Mapping):
         for pattern, value in prior.items():
             if is_function(pattern, value):
                 continue
             hits = _matching("prior", pattern, names, strict)
             sigma[hits] = _positive(f"prior of {pattern}", value)
-    else:
+        return sigma
+    if prior is not None:
         sigma[:of_machine] = _positive("prior", prior) * scale[:of_machine]
         sigma[[is_of_load(name) for name in names]] = np.inf  # forces are no lengths
-    return sigma
+    return np.where(np.isfinite(of_effects), of_effects, sigma)
 
 
 def _positive(what: str, value: object) -> float:
