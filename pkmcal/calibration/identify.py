@@ -137,6 +137,7 @@ def identify(
         word a warning names them.
     effects : sequence of effects, or "auto"
         What moves the machine off the pose that its geometry gives: ``[pk.Expansion(11.5e-6)]``,
+        by loads of the rows ``[pk.Elasticity("offset*")]``,
         of an arm ``[pk.Sag()]``. "auto": sag of an arm, if it helps at poses left out.
 
     Returns

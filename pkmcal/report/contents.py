@@ -320,6 +320,13 @@ def over_the_workspace(found: Identification) -> tuple[WorkspaceAccuracy, Slice 
     return sampled, Slice((axes[0], axes[1]), (grid.values[0], grid.values[1]), accuracy)
 
 
+def over_the_measured(found: Identification) -> FloatArray:
+    """Predict the accuracy at the poses that were measured, mm; those that are known."""
+    end = found.fit.end
+    predicted = expected(found, end.actuators if isinstance(found.robot, SerialArm) else end.pose)
+    return predicted[np.isfinite(predicted)]
+
+
 def _endless(robot: Robot) -> bool:
     """Whether nothing says how far legs, cables or carriages go: a workspace may be anywhere."""
     return not robot.model.workspace and any(
