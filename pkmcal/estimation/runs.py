@@ -33,8 +33,8 @@ def runs_apart(
             run if len(places[run]) == 1 else f"{_name(place, list(places[run]))}.{run}"
             for run, place in zip(runs, _places(measured), strict=True)
         ]
-        if named != runs and isinstance(measured.instrument, RelativeDistance):
-            instrument = replace(measured.instrument, run=np.array(named))
+        if named != runs:
+            instrument = measured.instrument.with_fields({"run": np.array(named)})
             measured = replace(measured, instrument=instrument)
         found.append(measured)
     return found

@@ -154,15 +154,16 @@ class Uncertainty:
         """Variances in mm² of a length of each set; NaN where nothing shows them."""
         return tuple(self.noise_of(i) for i in range(len(self.equations.table.sets)))
 
-    def _rounding(self, i: int) -> float:
-        """The largest variance that rounding alone gives a length of set `i`, mm²."""
-        units = self.equations.table.sets[i].units
+    def _rounding(self, i: int, family: int) -> float:
+        """The largest variance that rounding alone gives a length of a family of set `i`, mm²."""
+        columns = self.equations.table.sets[i].instrument.families[family].columns
+        arcs = self.equations.arcs[i]
         floors = [
-            each.floor
+            arcs[each.component] * each.floor
             for each in self.coarse
-            if each.set == i and (units[each.component] == "mm" or "mm" not in units)
+            if each.set == i and each.component in columns
         ]
-        return (self.equations.arcs[i] * max(floors, default=0.0)) ** 2
+        return float(max(floors, default=0.0)) ** 2
 
     @cached_property
     def excess(self) -> Noise:
@@ -184,7 +185,7 @@ class Uncertainty:
         mine = self.family_of(i, family) if family else self.lengths_of(i)
         retained = self.covariance.sandwich.retained[mine]
         total, shared = noise(self.adjusted[mine], retained, numbered(self.fit.key[mine]))
-        return max(total, self._rounding(i)), shared
+        return max(total, self._rounding(i, family)), shared
 
     def stated_variances(self, i: int, family: int = 0) -> FloatArray | None:
         """`stated_variances` of set `i` in mm², of angles those of their arcs."""
