@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Literal
+from typing import Literal, TypeVar, cast
 
 from pkmcal.arguments import earlier_keywords, word, words
 from pkmcal.arms.arm import SerialArm
@@ -44,10 +44,12 @@ from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
 
+Given = TypeVar("Given", bound=Robot | SerialArm)
+
 
 @earlier_keywords(*EARLIER, now=now)
 def identify(
-    robot: Robot | SerialArm,
+    robot: Given,
     measurements: Measurements | Sequence[Measurements],
     free: str | Sequence[str] | None = None,
     *,
@@ -60,7 +62,7 @@ def identify(
     fix: str | Sequence[str] = (),
     drop: Drop = None,
     effects: Effects | Literal["auto"] = (),
-) -> Identification:
+) -> Identification[Given]:
     """Find the geometry that agrees best with measurements.
 
     Weighted least squares on the measured quantities, through the forward kinematics and its
@@ -135,6 +137,7 @@ def identify(
         word a warning names them.
     effects : sequence of effects, or "auto"
         What moves the machine off the pose that its geometry gives: ``[pk.Expansion(11.5e-6)]``,
+        by loads of the rows ``[pk.Elasticity("offset*")]``,
         of an arm ``[pk.Sag()]``. "auto": sag of an arm, if it helps at poses left out.
 
     Returns
@@ -206,10 +209,10 @@ def identify(
     found = result(rows, fitted, sure, held, find_slack=not drop_slack)
     for text in found.warnings:
         warnings.warn(text, CalibrationWarning, stacklevel=3)  # of who called, beyond the adapter
-    return found
+    return cast("Identification[Given]", found)  # an arm for an arm
 
 
-def _automatic(identified: Callable[..., Identification]) -> Identification:
+def _automatic(identified: Callable[..., Identification[Given]]) -> Identification[Given]:
     """The calibration with the sag that helps at poses left out, or else without."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", CalibrationWarning)

@@ -62,7 +62,7 @@ class Equations:
     blocks : RowBlocks
         Which equations count together.
     state : DriveState
-        From where the actuators came, and the tension of what they drive, (K, n) each.
+        From where the actuators came, the tension of what they drive, and what was carried.
     without_slack : ndarray (K, n)
         What the actuators would read if no cable were slack.
     """

@@ -37,7 +37,7 @@ class Machines:
     rows : tuple of ndarray of int
         The poses that are its own, of each.
     state : DriveState
-        From where the actuators came, and the tension of what they drive (K, n).
+        From where the actuators came, the tension of what they drive, and what was carried.
     """
 
     robots: tuple[Calibratable, ...]

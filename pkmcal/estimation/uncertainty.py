@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, IntArray
-from pkmcal.estimation.coarse_readings import Coarse, coarse_readings
+from pkmcal.estimation.coarse_readings import Coarse, coarse_readings, component_of
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.estimate import Estimate
 from pkmcal.estimation.estimator import FEW, Estimator
@@ -146,8 +146,7 @@ class Uncertainty:
     @cached_property
     def _place(self) -> IntArray:
         """Which component of its row each equation is (M,)."""
-        every = [np.tile(np.arange(len(m.components)), len(m)) for m in self.equations.table.sets]
-        return np.concatenate(every)[self.equations.whitening.present]
+        return component_of(self.equations)
 
     @cached_property
     def noises(self) -> tuple[Noise, ...]:
@@ -155,15 +154,15 @@ class Uncertainty:
         return tuple(self.noise_of(i) for i in range(len(self.equations.table.sets)))
 
     def _rounding(self, i: int, family: int) -> float:
-        """The largest variance that rounding alone gives a length of a family of set `i`, mm²."""
+        """The largest variance that rounding alone gives one family of set `i`, mm²."""
         columns = self.equations.table.sets[i].instrument.families[family].columns
         arcs = self.equations.arcs[i]
         floors = [
-            arcs[each.component] * each.floor
+            float(arcs[each.component]) * each.floor
             for each in self.coarse
             if each.set == i and each.component in columns
         ]
-        return float(max(floors, default=0.0)) ** 2
+        return max(floors, default=0.0) ** 2
 
     @cached_property
     def excess(self) -> Noise:

@@ -22,6 +22,7 @@ from pkmcal.estimation.mirror import MIRROR, mirror_fits
 from pkmcal.estimation.uncertainty import Uncertainty
 from pkmcal.fitted.distances import distances
 from pkmcal.fitted.dropped import outlying
+from pkmcal.kinematics.robot import Robot
 from pkmcal.statistics.distributions import t_factor
 from pkmcal.statistics.linear_fit import triangle
 from pkmcal.statistics.prior_test import LEAST_FREEDOM, PriorTest, data_alone, prior_test
@@ -81,7 +82,8 @@ def identifiability(estimator: Estimator, estimate: Estimate) -> dict[str, Any]:
     chosen = equations.parameters
     names: tuple[str, ...] = ()
     rest = measured.unidentifiable
-    if equations.closures.unknowns:
+    yields = isinstance(chosen.robot, Robot) and chosen.robot.model.elastic is not None
+    if equations.closures.unknowns or yields:
         names, rest = gauges(chosen, rest)
         if len(estimate.prior):  # a tape on two anchors ends the scale, say
             names, _ = gauges(chosen, estimate.state.determined.unidentifiable)
