@@ -23,7 +23,6 @@ from pkmcal.calibration.identification import Identification
 from pkmcal.calibration.steps import (
     begin,
     compare,
-    judged,
     prepare,
     result,
     solve,
@@ -195,18 +194,17 @@ def identify(
             rows, problem = without_outliers(rows, problem, chosen)
         if drop_slack:
             problem = without_slack(problem)
-        fitted = solve(problem, weighed)
+        fit = solve(problem, weighed, rule)
         if find_datum:
-            fitted = with_datum(fitted, rows, asked)
+            fit = with_datum(fit, rows, asked)
     except ValueError as error:
         hint = likely_mistakes(rows.fitted, chosen, problem.start)
         if not hint and not problem.start.ok:
             hint = ["check units, signs and columns of their actuators, or leave these rows out"]
         raise ArgumentError("; ".join([f"measurements: {error}", *hint])) from None
-    fitted = with_component_noise(fitted)
-    sure = judged(fitted, rule)
-    rows, held = compare(rows, fitted, sure, drop_outliers)
-    found = result(rows, fitted, sure, held, find_slack=not drop_slack)
+    fit = with_component_noise(fit)
+    rows, held = compare(rows, fit, drop_outliers)
+    found = result(rows, fit, held, find_slack=not drop_slack)
     for text in found.warnings:
         warnings.warn(text, CalibrationWarning, stacklevel=3)  # of who called, beyond the adapter
     return cast("Identification[Given]", found)  # an arm for an arm

@@ -83,7 +83,7 @@ def identifiability(estimator: Estimator, estimate: Estimate) -> dict[str, Any]:
     names: tuple[str, ...] = ()
     rest = measured.unidentifiable
     yields = isinstance(chosen.robot, Robot) and chosen.robot.model.elastic is not None
-    if equations.closures.unknowns or yields:
+    if equations.machines.unknowns or yields:
         names, rest = gauges(chosen, rest)
         if len(estimate.prior):  # a tape on two anchors ends the scale, say
             names, _ = gauges(chosen, estimate.state.determined.unidentifiable)
@@ -137,8 +137,8 @@ def misfit(
         "closure_rms": misfits.closure_rms(equations, estimate.evaluation),
         "closure_rms_before": misfits.closure_rms(equations, estimator.start),
         "closures": misfits.worst_closures(equations, estimate.evaluation),
-        "actuator_noise": float(shown[-1]) if equations.closures.unknowns else float("nan"),
-        "tension_noise": float(shown[-2]) if equations.closures.cells else float("nan"),
+        "actuator_noise": float(shown[-1]) if equations.machines.unknowns else float("nan"),
+        "tension_noise": float(shown[-2]) if equations.machines.cells else float("nan"),
         "tension_rms": misfits.cell_rms(equations, estimate.evaluation),
         "redundancy": tuple(estimate.freedom.tolist()),
         "idle": equations.blocks.uninformative,

@@ -150,7 +150,7 @@ def information(equations: Equations, poses: int) -> FloatArray:
     rows *= equations.parameters.scale
     block_of_row = equations.blocks.block_of_row
     first = np.arange(0, len(block_of_row), len(block_of_row) // poses)
-    if not equations.closures.unknowns:  # rows are blocks, in their order
+    if not equations.machines.unknowns:  # rows are blocks, in their order
         return rows.reshape(poses, -1, rows.shape[1])
     units: FloatArray = rows.reshape(len(equations.blocks.components), -1, rows.shape[1])
     return units[block_of_row[first]]

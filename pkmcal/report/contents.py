@@ -201,7 +201,7 @@ def iso9283(found: Identification) -> list[dict[str, Any]]:
     equations = found.fit.equations
     scores = []
     for i, measured in enumerate(equations.table.sets):
-        if measured.kind not in ("position", "pose"):
+        if not measured.instrument.is_place:
             continue
         read = np.isfinite(measured.values).all(axis=1)
         odd = np.isin(equations.table.rows[equations.table.set_of == i], found.outliers)
