@@ -99,7 +99,7 @@ class Identification(Solution, Result):
         """
         if isinstance(self.robot, SerialArm):
             return ()
-        prior = np.asarray(self.fit.estimate.prior.any(axis=0))
+        prior = np.asarray(self.fit.estimate.prior.any(axis=0))[self.columns]
         return law_tests(self.robot.geometry, self, self.fit.uncertainty, prior)
 
     @property
@@ -303,6 +303,8 @@ class Identification(Solution, Result):
         yield from (summary.filled("", str(test)) for test in self.law_tests)
         if self.at_bounds:
             yield summary.bounds(self.at_bounds)
+        if self.nuisances:
+            yield summary.fitted_along(self.nuisances)
         yield ""
         yield from summary.parameter_rows(self)
         if self.holdout_own:

@@ -285,9 +285,10 @@ def result(
         end = exact.at(end.theta, near=end)
     fits = misfit(estimator, estimate, sure, (problem.start, end))
     cells = _found_slack(problem) if find_slack and fits["outliers"] else problem.slack
+    table = parameter_table(estimator, estimate, sure)
     return Identification(
-        **parameter_table(estimator, estimate, sure),
-        **identifiability(estimator, estimate),
+        **table,
+        **identifiability(estimator, estimate, len(chosen) - len(table["free"])),
         **fits,
         **repeats(sure),
         **vars(held),
@@ -297,6 +298,7 @@ def result(
         robot=robots[chosen.sessions[-1] if chosen.sessions else ""],
         robots=_of_sessions(robots, held),
         prior_test=tested_prior(estimator, estimate),
+        uncertainty_test=tested_prior(estimator, estimate, of_uncertain=True),
         fit=Fit(exact, problem.start, end, estimate, sure),
         datum=fitted.datum,
         dropped=rows.dropped,

@@ -19,6 +19,7 @@ from pkmcal.cli.geometry_options import (
     matching,
     read_coefficients,
     read_prior,
+    read_uncertainty,
 )
 from pkmcal.cli.inputs import Inputs
 from pkmcal.cli.measured import (
@@ -34,7 +35,7 @@ from pkmcal.cli.measured import (
     rows_to_drop,
     without_lines,
 )
-from pkmcal.cli.options import Force, Free, Json, Prior, RobotOrArm
+from pkmcal.cli.options import Consider, Force, Free, Json, Prior, RobotOrArm, Uncertainty
 from pkmcal.cli.output import Output, say
 from pkmcal.cli.progress import progress
 from pkmcal.cli.sessions import in_sessions
@@ -59,6 +60,8 @@ def calibrate(
     ],
     free: Free = None,
     prior: Prior = None,
+    uncertainty: Uncertainty = None,
+    consider: Consider = None,
     holdout: Annotated[
         str | None,
         typer.Option(
@@ -275,6 +278,7 @@ def calibrate(
             fix=[*fixed, *held_by_datum],
             drop=[*dropped, *(each for each, asked in found_rows.items() if asked)],
             effects=[] if coefficients is None else [pk.Expansion(coefficients)],
+            uncertainty=read_uncertainty(uncertainty or [], consider or [], machine),
         )
     if output is not None:
         with progress("picture"), output.draft() as draft:
@@ -348,9 +352,14 @@ def _save(found: pk.Identification, path: Path, read: Inputs, robot: str) -> Non
     if isinstance(calibrated, pk.SerialArm) or isinstance(source, str):
         calibrated.save(path, read.comment())
         return
-    columns = found.fit.parameters.geometry_of()
-    names = [calibrated.geometry.names[place] for place in found.fit.parameters.places]
-    known = dict(zip(names, found.stderr[columns].tolist(), strict=True))
+    chosen = found.fit.parameters
+    sigma = {each.name: each.stderr for each in found.nuisances}
+    sigma |= dict(zip(found.free, found.stderr.tolist(), strict=True))
+    names = [calibrated.geometry.names[place] for place in chosen.places]
+    known = {
+        name: sigma[chosen.names[column]]
+        for name, column in zip(names, chosen.geometry_of().tolist(), strict=True)
+    }
     calibrated.save(path, read.comment(), like=source, deviations=known)
 
 

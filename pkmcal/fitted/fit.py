@@ -68,5 +68,7 @@ class Fit:
         Of the measurements alone, whatever a prior says.
         """
         basis = self.estimate.state.measured.identifiable
-        along = np.linalg.svd(basis[self.parameters.geometry.stop :], compute_uv=False)
+        chosen = self.parameters
+        beside = np.arange(len(chosen)) >= chosen.geometry.stop
+        along = np.linalg.svd(basis[beside | chosen.uncertain], compute_uv=False)
         return int(basis.shape[1] - np.count_nonzero(along > _LEAST))
