@@ -16,6 +16,7 @@ from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray, as_rows, propagate
 from pkmcal.calibration import summary
 from pkmcal.core import instruments
+from pkmcal.diagnostics.breakeven import Breakeven, breakeven, in_words
 from pkmcal.diagnostics.checks import AT_ONCE, CHECKS
 from pkmcal.diagnostics.diagnosis import Diagnosis
 from pkmcal.diagnostics.drift import Drift
@@ -24,7 +25,7 @@ from pkmcal.diagnostics.measuring_order import MeasuringOrder
 from pkmcal.diagnostics.moved import Moved
 from pkmcal.diagnostics.verdict import Verdict, diagnose
 from pkmcal.display import Table
-from pkmcal.effects.expansion import in_words
+from pkmcal.effects.expansion import in_words as heat_in_words
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.fitted.row_names import row_names
 from pkmcal.fitted.solution import Solution
@@ -90,6 +91,14 @@ class Identification(Solution, Result):
         """Whether residuals follow the order of measuring; None where too few can say."""
         found: MeasuringOrder | None = self._finding("measuring-order")
         return found
+
+    @cached_property
+    def breakeven(self) -> tuple[Breakeven, ...]:
+        """How wrong numbers that are not free may be before standard deviations are double.
+
+        Of lengths, angles and ratios; without those whose uncertainty is stated.
+        """
+        return breakeven(self.fit)
 
     @cached_property
     def law_tests(self) -> tuple[LawTest, ...]:
@@ -284,7 +293,9 @@ class Identification(Solution, Result):
         yield f"{self.robot.name}: {len(self.free)} parameters from {summary.counts(self.read)}"
         if self.sessions:
             yield summary.sessions(self.sessions)
-        if heat := in_words(self.fit.equations.sets, self.expansion, self.fit.parameters.robot):
+        if heat := heat_in_words(
+            self.fit.equations.sets, self.expansion, self.fit.parameters.robot
+        ):
             yield summary.filled("", heat)
         yield summary.misfit_table(self)
         yield summary.quality(self)
@@ -305,6 +316,8 @@ class Identification(Solution, Result):
             yield summary.bounds(self.at_bounds)
         if self.nuisances:
             yield summary.fitted_along(self.nuisances)
+        if doubled := in_words(self.breakeven):
+            yield summary.filled("", doubled)
         yield ""
         yield from summary.parameter_rows(self)
         if self.holdout_own:
