@@ -8,16 +8,21 @@ from typing import Any, Literal, cast
 from pkmcal.arguments import word, words
 from pkmcal.effects.effect import Effect
 from pkmcal.effects.expansion import Expansion
+from pkmcal.estimation.loss import LIMITS, LossName
 from pkmcal.estimation.parameters import Known
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.fitted.datum import DATUM
 from pkmcal.kinematics.calibratable import Calibratable
+from pkmcal.statistics.covariance import RULES, CovarianceRule
 
 Role = Literal["frame", "target", "attachment"]
 ROLES: tuple[Role, ...] = ("frame", "target", "attachment")
 Unknown = Role | Sequence[Role] | Mapping[Role, Known | Sequence[Known]]
 
-EARLIER = ("frame", "target", "attachment", "datum", "expansion", "slack")
+ErrorWord = LossName | Literal["classical", "cluster"]
+_ERROR_WORDS: tuple[ErrorWord, ...] = (*LIMITS, "classical", "cluster")
+
+EARLIER = ("frame", "target", "attachment", "datum", "expansion", "slack", "covariance")
 
 
 def unknown_roles(unknown: Unknown) -> dict[str, Known | Sequence[Known]]:
@@ -26,6 +31,17 @@ def unknown_roles(unknown: Unknown) -> dict[str, Known | Sequence[Known]]:
         unknown = dict.fromkeys(cast(Any, words("unknown", unknown)), "unknown")
     known: dict[str, Known | Sequence[Known]] = dict.fromkeys(ROLES, "known")
     return known | {word("unknown", role, ROLES): given for role, given in unknown.items()}
+
+
+def loss_and_rule(loss: ErrorWord | Sequence[ErrorWord]) -> tuple[LossName, CovarianceRule]:
+    """The loss, and whether errors are taken to be shared; as the residuals say by default."""
+    given: list[str] = [word("loss", each, _ERROR_WORDS) for each in words("loss", loss)]
+    losses = [each for each in given if each in LIMITS]
+    rules = [each for each in given if each in RULES]
+    for several in (losses, rules):
+        if len(several) > 1:
+            raise ArgumentError(f"loss: {' and '.join(several)} exclude each other")
+    return cast(tuple[LossName, CovarianceRule], (*(losses or ["linear"]), *(rules or ["auto"])))
 
 
 def fixed_names(fix: str | Sequence[str]) -> tuple[tuple[str, ...], bool]:
@@ -65,6 +81,9 @@ def now(before: dict[str, Any], others: dict[str, Any]) -> dict[str, Any]:
         new["fix"] = _beside(others.get("fix"), DATUM)
     if word("slack", before.get("slack", "keep"), ("keep", "drop")) == "drop":
         new["drop"] = _beside(others.get("drop"), "slack")
+    rule = word("covariance", before.get("covariance", "auto"), RULES)
+    if rule != "auto":
+        new["loss"] = _beside(others.get("loss"), rule)
     if before.get("expansion") is not None:
         new["effects"] = [*others.get("effects", ()), Expansion(before["expansion"])]
     return new

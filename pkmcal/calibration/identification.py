@@ -294,12 +294,12 @@ class Identification(Solution, Result):
         if self.sessions:
             yield summary.sessions(self.sessions)
         if heat := heat_in_words(
-            self.fit.equations.sets, self.expansion, self.fit.parameters.robot
+            self.fit.equations.table.sets, self.expansion, self.fit.parameters.robot
         ):
             yield summary.filled("", heat)
         yield summary.misfit_table(self)
         yield summary.quality(self)
-        datasets, chosen = self.fit.equations.datasets, self.fit.parameters
+        datasets, chosen = self.fit.equations.prediction.datasets, self.fit.parameters
         framed = len(self.free) > len(chosen.places) or isinstance(self.robot, SerialArm)
         if self.datum.names:
             yield summary.filled("", str(self.datum))

@@ -5,13 +5,15 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 
-from pkmcal.arguments import earlier_keywords, word, words
+from pkmcal.arguments import earlier_keywords, words
 from pkmcal.arms.arm import SerialArm
 from pkmcal.calibration.asked import (
     EARLIER,
+    ErrorWord,
     Unknown,
     effects_on,
     fixed_names,
+    loss_and_rule,
     now,
     unknown_roles,
 )
@@ -32,7 +34,6 @@ from pkmcal.diagnostics.row_errors import likely_mistakes
 from pkmcal.effects.effect import Effects
 from pkmcal.estimation.datasets import as_fit_data, by_set
 from pkmcal.estimation.free_parameters import parameters
-from pkmcal.estimation.loss import LIMITS, LossName
 from pkmcal.estimation.parameters import Asked, Bounds, Prior
 from pkmcal.estimation.uncertain_numbers import uncertain_sets
 from pkmcal.exceptions import ArgumentError, CalibrationWarning
@@ -41,7 +42,6 @@ from pkmcal.geometry.stated_uncertainty import Uncertain, stated_uncertainty
 from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.statistics.covariance import RULES, CovarianceRule
 
 
 @earlier_keywords(*EARLIER, now=now)
@@ -51,11 +51,10 @@ def identify(
     free: str | Sequence[str] | None = None,
     *,
     prior: Prior = None,
-    loss: LossName = "linear",
+    loss: ErrorWord | Sequence[ErrorWord] = "linear",
     unknown: Unknown = (),
     holdout: float | Measurements | None = None,
     bounds: Bounds = None,
-    covariance: CovarianceRule = "auto",
     per_session: str | Sequence[str] = (),
     fix: str | Sequence[str] = (),
     drop: Drop = None,
@@ -84,8 +83,12 @@ def identify(
         length of a sum of points, ``"|base1 - base2|"``; a pair is a value that was measured
         otherwise, and its deviation.
         None: no prior; unidentifiable combinations then move as little as possible.
-    loss : {"linear", "huber", "cauchy"}
-        Weight of rows with large residuals, by the length of the whole measured vector.
+    loss : {"linear", "huber", "cauchy", "classical", "cluster"} or several of them
+        How rows err. "linear", "huber", "cauchy": the weight of rows with large residuals, by the
+        length of the whole measured vector. Beside it "cluster": rows of one pose may share an
+        error, as several targets and repeats do; "classical": all errors are independent. These two
+        change how uncertain the parameters are, not their values. Without either "cluster" holds
+        where the residuals show a shared error or the loss is robust.
     unknown : str, sequence of str or mapping
         What is to be found beside the numbers of the machine: "frame", "target", "attachment", or
         several of them. No start near them is needed.
@@ -107,11 +110,6 @@ def identify(
         measurements: they are not fitted, only compared.
     bounds : mapping of str to (float, float), optional
         Lower and upper limit by name or wildcard, mm and rad.
-    covariance : {"auto", "classical", "cluster"}
-        How uncertain the parameters are. "cluster": rows of one pose may share an error, as
-        several targets and repeats do. "classical": all errors are independent. "auto": cluster
-        where the residuals show a shared error or the loss is robust, else classical. The values
-        are the same.
     per_session : str or sequence of str
         Names or wildcards, ``"offset*"``, ``"frame*"``, of what is found anew in each
         `Measurements.session`: ``offset5@thursday``. A set without sessions is one, named after its
@@ -184,21 +182,20 @@ def identify(
     fixed, find_datum = fixed_names(fix)
     stated = machine.model.uncertainty.with_later(stated_uncertainty(uncertainty))
     moving = effects_on(machine, effects)
+    weighed, rule = loss_and_rule(loss)
     given = as_fit_data(machine, measurements, roles, bool(own), moving)
     given, uncertain = uncertain_sets(machine, given, stated)
     asked = Asked(free, prior, bounds, own, by_set(roles), fixed, frozenset(), stated, uncertain)
     named, drop_outliers, drop_slack = left_out(drop, sum(len(data.rows) for data in given))
     rows = prepare(machine, given, holdout, named, bool(own))
     chosen = parameters(machine, rows.fitted, asked)
-    word("loss", loss, LIMITS)
-    word("covariance", covariance, RULES)
     problem = begin(rows, chosen)
     try:
         if drop_outliers:
             rows, problem = without_outliers(rows, problem, chosen)
         if drop_slack:
             problem = without_slack(problem)
-        fitted = solve(problem, loss)
+        fitted = solve(problem, weighed)
         if find_datum:
             fitted = with_datum(fitted, rows, asked)
     except ValueError as error:
@@ -207,7 +204,7 @@ def identify(
             hint = ["check units, signs and columns of their actuators, or leave these rows out"]
         raise ArgumentError("; ".join([f"measurements: {error}", *hint])) from None
     fitted = with_component_noise(fitted)
-    sure = judged(fitted, covariance)
+    sure = judged(fitted, rule)
     rows, held = compare(rows, fitted, sure, drop_outliers)
     found = result(rows, fitted, sure, held, find_slack=not drop_slack)
     for text in found.warnings:

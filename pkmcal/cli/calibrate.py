@@ -262,6 +262,7 @@ def calibrate(
         raise ArgumentError(f"--fix {','.join(fix or [])}: no parameter is left free")
     found_rows: dict[Found, bool] = {"outliers": drop_outliers, "slack": drop_slack}
     held_by_datum = ["datum"] if word("--datum", datum, ("none", "auto")) == "auto" else []
+    weight, rule = word("--loss", loss, LIMITS), word("--covariance", covariance, RULES)
     coefficients = read_coefficients("--expansion", expansion or [])
     with progress("identifying"), warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # the summary has them
@@ -270,10 +271,9 @@ def calibrate(
             measured[0] if len(measured) == 1 else measured,
             free=chosen or None,
             prior=read_prior(prior or [], machine, chosen),
-            loss=word("--loss", loss, LIMITS),
+            loss=weight if rule == "auto" else (weight, rule),
             unknown=_unknown(frame, target, attachment, measured),
             holdout=held,
-            covariance=word("--covariance", covariance, RULES),
             per_session=anew,
             fix=[*fixed, *held_by_datum],
             drop=[*dropped, *(each for each, asked in found_rows.items() if asked)],

@@ -113,4 +113,5 @@ def _twists(fit: Fit) -> FloatArray:
     good = end.status == 0
     twists = robot.error_twists(end.pose[good], end.actuators[good]).copy()
     twists[:, :3] *= robot.length
-    return twists.reshape(-1, twists.shape[2])
+    flat: FloatArray = twists.reshape(-1, twists.shape[2])
+    return flat

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Generic, Literal, TypeVar
 
+from pkmcal.estimation.loss import LIMITS
 from pkmcal.fitted.solution import Solution
 
 F = TypeVar("F")
@@ -22,12 +23,7 @@ _OPTIONS = {  # what the command line says otherwise than `identify`; None: it h
     ("effects", None): "--expansion",
     ("bounds", None): None,
 }
-_SEVERAL = (
-    "drop",
-    "fix",
-    "per_session",
-    "unknown",
-)  # arguments that take more beside what they have
+_SEVERAL = ("drop", "fix", "loss", "per_session", "unknown")  # more beside what they have
 
 
 @dataclass(frozen=True)
@@ -49,6 +45,8 @@ class Remedy:
     '--drop 4,17'
     >>> Remedy("drop", "outliers").applied({"drop": (3,), "holdout": 0.2})
     {'drop': (3, 'outliers'), 'holdout': 0.2}
+    >>> Remedy("loss", "cauchy").applied({"loss": ("huber", "cluster")})
+    {'loss': ('cluster', 'cauchy')}
     """
 
     argument: str
@@ -59,8 +57,14 @@ class Remedy:
         before = arguments.get(self.argument)
         value = self.value
         if self.argument in _SEVERAL and before is not None:
-            value = tuple(dict.fromkeys((*_listed(before), *_listed(value))))
+            kept = [each for each in _listed(before) if not self._replaces(each)]
+            several = tuple(dict.fromkeys((*kept, *_listed(value))))
+            value = several if len(several) > 1 else value
         return {**arguments, self.argument: value}
+
+    def _replaces(self, word: object) -> bool:
+        """Whether a word that the argument has is another loss: there is only one."""
+        return self.argument == "loss" and {self.value, word} <= LIMITS.keys()
 
     @property
     def option(self) -> str | None:

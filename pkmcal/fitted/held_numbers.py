@@ -57,7 +57,7 @@ def held_numbers(
     if sure.mixed:
         return None
     fitted, chosen = sure.equations, sure.equations.parameters
-    wide = beside(chosen, fitted.datasets, stated)
+    wide = beside(chosen, fitted.prediction.datasets, stated)
     if wide is None:
         return None
     sets, more = wide

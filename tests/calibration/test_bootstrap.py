@@ -144,7 +144,7 @@ def test_residuals_that_are_drawn_are_as_large_as_the_noise(hexapod: Robot) -> N
         measured = dataclasses.replace(each.measure(q), sigma=0.02)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", pk.CalibrationWarning)
-            found = pk.identify(hexapod, measured, free="offset*", covariance="classical")
+            found = pk.identify(hexapod, measured, free="offset*", loss="classical")
         fit = found.fit
         true = np.diag(fit.covariance) / fit.uncertainty.covariance.scale**2
         seeds = np.random.SeedSequence(1).spawn(12)

@@ -170,7 +170,7 @@ def test_of_deviations_by_the_spread_of_poses_the_test_is_hotellings() -> None:
     measured = pk.VirtualMachine(robot, noise=SIGMA, angle_noise=SIGMA / 1000.0, seed=4).measure(
         q, kind="pose"
     )
-    found = pk.identify(robot, measured, free=free, covariance="cluster")
+    found = pk.identify(robot, measured, free=free, loss="cluster")
     (test,) = found.law_tests
     columns = [found.free.index(name) for name in test.names]
     values, covariance = found.values[columns], found.covariance[np.ix_(columns, columns)]
@@ -187,7 +187,7 @@ def test_of_numbers_known_unlike_well_the_test_has_the_least_degrees_of_freedom(
     robot, true, free = machines("quadratic")
     instrument = pk.VirtualMachine(true, noise=SIGMA, angle_noise=SIGMA / 20.0, seed=5)
     measured = replace(instrument.measure(rows(true, 20), kind="pose"), sigma=None)
-    found = pk.identify(robot, measured, free=free, covariance="classical")
+    found = pk.identify(robot, measured, free=free, loss="classical")
     (test,) = found.law_tests
     columns = [found.free.index(name) for name in test.names]
     factor = np.ptp(found.interval95[columns], axis=1) / 2 / found.stderr[columns]

@@ -34,6 +34,10 @@ def measured(hexapod: pk.Robot) -> pk.Measurements:
      r"write fix=\['offset2', 'datum'\]"),
     ({"slack": "drop", "drop": [3]}, {"drop": [3, "slack"]}, r"write drop=\[3, 'slack'\]"),
     ({"expansion": 1e-5}, {"effects": [pk.Expansion(1e-5)]}, "write effects="),
+    ({"covariance": "cluster"}, {"loss": "cluster"}, "write loss='cluster'"),
+    ({"covariance": "classical", "loss": "huber"}, {"loss": ("classical", "huber")},
+     r"write loss=\['huber', 'classical'\]"),
+    ({"covariance": "auto"}, {}, "leave it out"),
 ])  # fmt: skip
 def test_they_give_the_same_numbers(
     hexapod: pk.Robot, measured: pk.Measurements, before: dict[str, Any], now: dict[str, Any],
@@ -56,6 +60,7 @@ def test_the_warning_points_at_the_call(hexapod: pk.Robot, measured: pk.Measurem
 @pytest.mark.parametrize(("arguments", "says"), [
     ({"datum": "automatic"}, "datum must be one of none, auto"),
     ({"slack": "left"}, "slack must be one of keep, drop"),
+    ({"covariance": "clusters"}, "covariance must be one of auto, classical, cluster"),
 ])  # fmt: skip
 def test_a_wrong_word_is_refused_as_before(
     hexapod: pk.Robot, measured: pk.Measurements, arguments: dict[str, Any], says: str
@@ -68,6 +73,10 @@ def test_a_wrong_word_is_refused_as_before(
     ({"drop": "outlier"}, "drop: 'outliers', 'slack' or numbers of rows, found 'outlier'; did"),
     ({"drop": [1.5]}, "drop: rows are whole numbers"),
     ({"unknown": "anchor"}, "unknown must be one of frame, target, attachment"),
+    ({"loss": ["huber", "cauchy"]}, "loss: huber and cauchy exclude each other"),
+    ({"loss": ("cluster", "classical")}, "loss: cluster and classical exclude each other"),
+    ({"loss": ["huber", "auto"]}, "loss must be one of linear, huber, cauchy, classical, cluster"),
+    ({"loss": 3}, "loss must be a name or several, found 3"),
     ({"effects": 11.5e-6}, "effects: expected such as"),
     ({"effects": [pk.Expansion(1e-5)] * 2}, "effects: expansion is stated more than once"),
 ])  # fmt: skip

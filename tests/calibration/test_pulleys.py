@@ -132,7 +132,7 @@ def test_deviations_are_honest(machine: pk.Robot) -> None:
 def test_swivels_make_every_number_surer(machine: pk.Robot) -> None:
     log = drawn(7, 40)
     lengths = pk.Measurements(log.lengths, None, "closure", actuator_sigma=NOISE)
-    alone = pk.identify(machine, lengths, FREE, covariance="classical")
+    alone = pk.identify(machine, lengths, FREE, loss="classical")
     both = fitted(machine, log)
     assert alone.rank == 12 and both.rank == 14
     at = [both.free.index(name) for name in alone.free]

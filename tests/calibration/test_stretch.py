@@ -124,7 +124,7 @@ def by_weight(robot: pk.Robot, seed: int, kind: str, count: int = 30) -> pk.Iden
     found = robot
     for _ in range(3):
         log = pk.Measurements(q, values, kind, sigma=NOISE, tension=balanced(found, q))
-        fit = pk.identify(robot, log, ["drive*"], covariance="classical")
+        fit = pk.identify(robot, log, ["drive*"], loss="classical")
         found = fit.robot
     return fit
 
@@ -174,7 +174,7 @@ def by_cells(
     q = length / (1.0 + stretch * tension) + rng.normal(0, CABLE, length.shape)
     cells = tension + rng.normal(0, 0.5, tension.shape)
     log = pk.Measurements(q, None, "closure", actuator_sigma=CABLE, tension=cells)
-    found = pk.identify(robot, log, [*numbers, "drive*"], covariance="classical")
+    found = pk.identify(robot, log, [*numbers, "drive*"], loss="classical")
     true = {name: anchors[place] for name, place in numbers.items()}
     true |= {f"drive{i}.stretch": STRETCH for i in (1, 2, 3, 4)}
     return found, np.array([true[name] for name in found.free])

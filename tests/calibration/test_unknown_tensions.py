@@ -125,7 +125,7 @@ def test_all_unknowns_at_once_say_the_same() -> None:
     read[3, 1] = read[5, 2] = read[5, 0] = False
     log = rows(data, 2.0, tension=np.where(read, data["cells"], np.nan))
     names = [*FREE, *FORCES, "load.cell3"]
-    found = pk.identify(four(), log, names, prior={"load.cell3": 0.05}, covariance="classical")
+    found = pk.identify(four(), log, names, prior={"load.cell3": 0.05}, loss="classical")
     values, deviations, cost = twin(data, 2.0, read)
     lengths = slice(len(FREE))
     assert np.abs(found.values - values)[lengths].max() < 1e-4
@@ -159,7 +159,7 @@ def test_stated_deviations_are_honest(cell: float) -> None:
     z, held = [], []
     for seed in range(300):
         data = simulated(seed, cell)
-        found = pk.identify(four(), rows(data, cell), [*FREE], covariance="classical")
+        found = pk.identify(four(), rows(data, cell), [*FREE], loss="classical")
         z.append((found.values - data["true"]) / found.stderr)
         ends = found.interval95
         held.append((ends[:, 0] < data["true"]) & (data["true"] < ends[:, 1]))

@@ -374,12 +374,12 @@ def test_a_sigma_too_small_by_two_and_a_half_is_always_noted(
 ) -> None:
     """Whichever covariance makes ± right, the reader learns that sigma or the model is not."""
     measured = replace(session(hexapod, true, 40, 0), sigma=0.02 / 2.5)
-    found = fitted(hexapod, measured, free="offset*", loss=loss, covariance=rule)
+    found = fitted(hexapod, measured, free="offset*", loss=(loss, rule))
     assert found.verdict.state == "calibrated"
     (note,) = found.verdict.remarks
     assert note.endswith(": sigma is too small, or numbers that are not free are wrong")
     sound = replace(session(hexapod, true, 40, 0), sigma=0.02)
-    right = fitted(hexapod, sound, free="offset*", loss=loss, covariance=rule)
+    right = fitted(hexapod, sound, free="offset*", loss=(loss, rule))
     assert not any("sigma is too small" in text for text in right.verdict.remarks)
 
 
@@ -449,6 +449,6 @@ def test_a_deviation_that_nothing_shows_is_infinite_not_small(hexapod: pk.Robot)
     q = np.repeat(hexapod.inverse(hexapod_poses(hexapod, 2, rng)), 20, axis=0)
     values = hexapod.forward(q).pose[:, :3] + rng.normal(0, 0.02, (40, 3))
     measured = Measurements(q, values, "position")
-    found = fitted(hexapod, measured, free="offset*", covariance="cluster")
+    found = fitted(hexapod, measured, free="offset*", loss="cluster")
     assert np.isinf(found.stderr).all() and np.isinf(found.interval95).all()
     assert np.isfinite(fitted(hexapod, measured, free="offset*").stderr).all()
