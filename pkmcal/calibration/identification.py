@@ -27,6 +27,7 @@ from pkmcal.diagnostics.verdict import Verdict, diagnose
 from pkmcal.display import Table
 from pkmcal.effects.expansion import in_words as heat_in_words
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
+from pkmcal.fitted.held_numbers import considered_places
 from pkmcal.fitted.row_names import row_names
 from pkmcal.fitted.solution import Solution
 from pkmcal.kinematics.calibratable import as_machine
@@ -201,7 +202,17 @@ class Identification(Solution, Result):
         by_numbers = machine.error_twists(at, actuators)[:, :, chosen.places]
         by_geometry = instruments.points(at, place)[1] @ by_numbers
         own = chosen.geometry_of(session)
-        deviation = np.sqrt(propagate(by_geometry, self.fit.covariance[np.ix_(own, own)]))
+        variance = propagate(by_geometry, self.fit.covariance[np.ix_(own, own)])
+        sure = self.fit.uncertainty
+        if sure.considered is not None:  # what they move by themselves is no more independent
+            follow = sure.reported[own] @ sure.considered
+            places, root = considered_places(chosen)
+            alone = machine.error_twists(at, actuators)[:, :, places]
+            moved_by = instruments.points(at, place)[1] @ alone @ root - by_geometry @ follow
+            variance += (moved_by**2).sum(axis=(1, 2)) - ((by_geometry @ follow) ** 2).sum(
+                axis=(1, 2)
+            )
+        deviation = np.sqrt(variance)
         undetermined = self.fit.undetermined() * chosen.scale[:, None]
         moved = np.linalg.norm(by_geometry @ undetermined[own], axis=(1, 2))
         return np.where(moved < _UNIDENTIFIABLE, deviation, np.inf).reshape(shape)

@@ -38,6 +38,7 @@ from pkmcal.estimation.parameters import Asked, Bounds, Prior
 from pkmcal.estimation.uncertain_numbers import uncertain_sets
 from pkmcal.exceptions import ArgumentError, CalibrationWarning
 from pkmcal.fitted.dropped import Drop, left_out
+from pkmcal.fitted.held_numbers import with_considered
 from pkmcal.geometry.stated_uncertainty import Uncertain, stated_uncertainty
 from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.kinematics.robot import Robot
@@ -204,7 +205,7 @@ def identify(
             hint = ["check units, signs and columns of their actuators, or leave these rows out"]
         raise ArgumentError("; ".join([f"measurements: {error}", *hint])) from None
     fitted = with_component_noise(fitted)
-    sure = judged(fitted, rule)
+    sure = with_considered(judged(fitted, rule), fitted.estimate.evaluation, stated)
     rows, held = compare(rows, fitted, sure, drop_outliers)
     found = result(rows, fitted, sure, held, find_slack=not drop_slack)
     for text in found.warnings:

@@ -60,6 +60,10 @@ class Uncertainty:
         `IterationState.noise`.
     slips : ndarray
         Of each set, `slipped`.
+    considered : ndarray (p, k) or None
+        How the basis follows numbers that are not fitted along, in their stated deviations.
+    noise_share : float
+        Of the residuals' variance, what these numbers do not explain.
     """
 
     labels: Labels
@@ -70,6 +74,8 @@ class Uncertainty:
     equations: Equations
     factors: FloatArray
     slips: FloatArray
+    considered: FloatArray | None = None
+    noise_share: float = 1.0
 
     @property
     def known(self) -> bool:
@@ -92,19 +98,34 @@ class Uncertainty:
         """Covariance (n, n) of the reported parameters; inf where the noise is not known."""
         if not self.known:
             return np.full((len(self.reported),) * 2, np.inf)
-        return self.covariance.of(self.reported)
+        return self.covariance.of(self.reported) + self._beside(self.reported)
 
     @cached_property
     def scaled(self) -> FloatArray:
         """Covariance (n, n) of the scaled parameters."""
-        return self.covariance.of(self.fit.back)
+        return self.covariance.of(self.fit.back) + self._beside(self.fit.back)
+
+    def _beside(self, contrasts: FloatArray) -> FloatArray | float:
+        """What numbers that are not fitted along add to the covariance of contrasts (q, p)."""
+        if self.considered is None:
+            return 0.0
+        follow = contrasts @ self.considered
+        added: FloatArray = follow @ follow.T
+        return added
 
     @cached_property
     def freedom(self) -> FloatArray:
         """Degrees of freedom (n,) of the variances of the reported parameters."""
         if not self.known:
             return np.zeros(len(self.reported))
-        return self.covariance.freedom(self.reported)
+        own = self.covariance.freedom(self.reported)
+        if self.considered is None:
+            return own
+        data = np.diagonal(self.covariance.of(self.reported))
+        known = ((self.reported @ self.considered) ** 2).sum(axis=1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            widened: FloatArray = own * (1.0 + known / data) ** 2  # what is stated is known
+        return np.where(data > 0.0, widened, own)
 
     @property
     def poses(self) -> IntArray:
@@ -115,7 +136,7 @@ class Uncertainty:
     def by_cluster(self) -> FloatArray:
         """Covariance (p, p) in the basis that allows for whatever rows of a pose share."""
         prior = self.fit.prior.T @ self.fit.prior
-        matrix: FloatArray = self.covariance.sandwich.data + prior
+        matrix: FloatArray = self.covariance.sandwich.data * self.noise_share + prior
         return matrix
 
     def in_units(self, whitened: FloatArray) -> FloatArray:
@@ -138,7 +159,9 @@ class Uncertainty:
     @cached_property
     def noises(self) -> tuple[Noise, ...]:
         """Variances in mm² of a length of each set; NaN where nothing shows them."""
-        return tuple(self._noise(i) for i in range(len(self.equations.table.sets)))
+        every = (self._noise(i) for i in range(len(self.equations.table.sets)))
+        share = self.noise_share
+        return tuple((total * share, shared * share) for total, shared in every)
 
     @cached_property
     def excess(self) -> Noise:

@@ -7,15 +7,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray
+from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.free_parameters import parameters
 from pkmcal.estimation.parameters import Parameters
-from pkmcal.estimation.uncertain_numbers import uncertain_sets
+from pkmcal.estimation.uncertain_numbers import spread, uncertain_names, uncertain_sets
 from pkmcal.estimation.uncertainty import Uncertainty
+from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.stated_uncertainty import StatedUncertainty
+
+_LEAST_NOISE = 0.25  # of the residuals' variance, that is noise whatever numbers are considered
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +75,49 @@ def held_numbers(
         columns,
         more.spread[np.ix_(mine, mine)],
     )
+
+
+def with_considered(sure: Uncertainty, end: Evaluation, stated: StatedUncertainty) -> Uncertainty:
+    """The uncertainty with that of numbers that are to stay where they are.
+
+    Where the noise is estimated, without what they explain of the residuals (at most three
+    quarters).
+
+    Raises
+    ------
+    ValueError
+        Poses do not follow from the actuators.
+    """
+    if not any(stated.consider.values()):
+        return sure
+    if sure.mixed:
+        raise ArgumentError(
+            "uncertainty: consider needs poses that follow from the actuators: no actuator_sigma,"
+            " and no surplus actuators"
+        )
+    geometry = sure.equations.parameters.robot.geometry
+    for pattern in stated.consider:
+        geometry.match(pattern, "uncertainty: consider")
+    held = held_numbers(sure, end, StatedUncertainty(stated.consider))
+    if held is None:
+        return sure
+    columns = held.columns @ np.linalg.cholesky(held.spread)
+    follow = sure.fit.design.T @ columns
+    left = float(((columns - sure.fit.design @ follow) ** 2).sum())
+    share = max(1.0 - left / sure.fit.squares, _LEAST_NOISE)
+    covariance = sure.covariance
+    if np.isfinite(covariance.scale_freedom):
+        covariance = replace(covariance, scale=covariance.scale * float(np.sqrt(share)))
+    return replace(sure, considered=follow, covariance=covariance, noise_share=share)
+
+
+def considered_places(chosen: Parameters) -> tuple[IntArray, FloatArray]:
+    """Places (k,) of considered numbers in the geometry's values, and the root of their spread."""
+    stated, geometry = StatedUncertainty(chosen.asked.uncertainty.consider), chosen.robot.geometry
+    free = [geometry.names[place] for place in chosen.places]
+    names = uncertain_names(stated, chosen.robot, free)
+    places = np.array([geometry.names.index(name) for name in names], dtype=np.intp)
+    return places, np.linalg.cholesky(spread(stated, names))
 
 
 def beside(

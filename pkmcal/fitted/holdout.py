@@ -20,7 +20,9 @@ from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.labels import Labels, labels
 from pkmcal.estimation.uncertainty import Uncertainty, stated_variances
 from pkmcal.fitted.distances import Distances, distances
+from pkmcal.fitted.held_numbers import beside, theta_of
 from pkmcal.fitted.later import Later, OwnNumbers, compared, later
+from pkmcal.geometry.stated_uncertainty import StatedUncertainty
 from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.statistics.distributions import f_tail
@@ -190,12 +192,14 @@ def evaluate(
 class _Points:
     """Lengths (M,) of the points held out; of a pose its position.
 
-    Residuals and design in mm, the variance of a reading and of what actuators add to it in mm²,
-    the share of each that numbers of its own session took, and the fitted set that each is like.
+    Residuals and design in mm, what numbers that were considered make of them, the variance of a
+    reading and of what actuators add to it in mm², the share of each that numbers of its own
+    session took, and the fitted set that each is like.
     """
 
     residual: FloatArray
     design: FloatArray
+    considered: FloatArray
     reading: FloatArray
     by_actuators: FloatArray
     taken: FloatArray
@@ -211,7 +215,17 @@ class _Points:
         added: FloatArray = np.einsum(
             "ij,jk,ik->i", self.design, uncertainty.by_cluster, self.design
         )
-        return added
+        return added + (self.considered**2).sum(axis=1)
+
+    def whole(self, uncertainty: Uncertainty) -> tuple[FloatArray, FloatArray]:
+        """Design (M, p + k) of all that makes an error, and the covariance of that."""
+        k, matrix = self.considered.shape[1], uncertainty.by_cluster
+        if not k:
+            return self.design, matrix
+        p = len(matrix)
+        covariance = np.eye(p + k)
+        covariance[:p, :p] = matrix
+        return np.hstack([self.design, self.considered]), covariance
 
 
 def _points(
@@ -261,11 +275,40 @@ def _points(
             [arc * part.ravel() for arc, part in zip(equations.arcs, after.residuals, strict=True)]
         ),
         design=by_fitted @ back,
+        considered=_considered(rows, equations, after, named, uncertainty, by_fitted @ back),
         reading=lengths(variances),
         by_actuators=by_sigma,
         taken=taken,
         like=np.array(like)[named.set_of[named.length]],
     )
+
+
+def _considered(
+    rows: Later,
+    equations: Equations,
+    after: Evaluation,
+    named: Labels,
+    uncertainty: Uncertainty,
+    design: FloatArray,
+) -> FloatArray:
+    """Errors (M, k) that considered numbers make in the lengths, mm in their deviations."""
+    if uncertainty.considered is None:
+        return np.zeros((len(design), 0))
+    stated = StatedUncertainty(rows.parameters.asked.uncertainty.consider)
+    wide = beside(rows.parameters, rows.data, stated)
+    assert wide is not None  # as of the fit
+    sets, more = wide
+    other = Equations.of(sets, more)
+    at = other.at(theta_of(more, rows.parameters, after.theta), near=after.states)
+    new = [i for i, name in enumerate(more.names) if name not in rows.parameters.names]
+    jacobian = np.concatenate([
+        arc * part.reshape(-1, part.shape[2])[:, new]
+        for arc, part in zip(equations.arcs, other.jacobian(at), strict=True)
+    ])[equations.whitening.present][named.length]  # fmt: skip
+    mine = np.isin(np.flatnonzero(more.uncertain), new)
+    root = np.linalg.cholesky(more.spread[np.ix_(mine, mine)])
+    found: FloatArray = jacobian @ root - design @ uncertainty.considered
+    return found
 
 
 def _odd(
@@ -279,6 +322,7 @@ def _odd(
     The noise is an estimate itself, as good as that of the fitted rows.
     """
     odd = np.zeros(count, dtype=bool)
+    whole, covariance = points.whole(uncertainty)
     if not uncertainty.known or not len(row):
         return odd
     freedom = uncertainty.fit.freedom if uncertainty.fit.freedom >= FEW else np.inf
@@ -288,8 +332,8 @@ def _odd(
     for k in np.unique(lengths[lengths > 0]).tolist():
         alike = np.flatnonzero(lengths == k)
         mine = order[first[alike, None] + np.arange(k)]
-        design, residual = points.design[mine], points.residual[mine]
-        variance = design @ uncertainty.by_cluster @ design.transpose(0, 2, 1)
+        design, residual = whole[mine], points.residual[mine]
+        variance = design @ covariance @ design.transpose(0, 2, 1)
         variance += np.eye(k) * own[mine][:, :, None]
         along = np.linalg.solve(variance, residual[:, :, None])[:, :, 0]
         squares = np.nan_to_num((residual * along).sum(axis=1), posinf=_HUGE)
@@ -348,9 +392,13 @@ def _test(
         return None
     fitted, split = _fitted_lengths(uncertainty, np.unique(points.like))
     unit = np.sqrt(own)
+    whole, covariance = points.whole(uncertainty)
+    fitted = replace(
+        fitted, design=np.pad(fitted.design, ((0, 0), (0, points.considered.shape[1])))
+    )
     held = Lengths(
         points.residual[good] / unit,
-        points.design[good] / unit[:, None],
+        whole[good] / unit[:, None],
         numbered(named.row[named.length][good]),
         numbered(named.pose[named.length][good]),
         named.component[named.length][good],
@@ -360,7 +408,7 @@ def _test(
     common = shared + float(np.mean(points.by_actuators[good] / own)) * total
     of_held = total, min(common, total)
     taken = float(points.taken[good].mean())
-    return holdout_test(fitted, held, split, uncertainty.by_cluster, of_held, taken)
+    return holdout_test(fitted, held, split, covariance, of_held, taken)
 
 
 def _fitted_lengths(uncertainty: Uncertainty, sets: IntArray) -> tuple[Lengths, Noise]:

@@ -1,5 +1,6 @@
 """Numbers that are not free and not exact: fitted along within their stated uncertainty."""
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -264,3 +265,50 @@ def test_the_statement_of_a_file_is_used(tmp_path):
     with pytest.warns(pk.CalibrationWarning, match="sigma"):
         exact = pk.identify(pk.load(path), m, "offset*", uncertainty={"gain*": 0.0})
     assert not exact.nuisances
+
+
+def test_numbers_that_stay_where_they_are_widen_the_deviations_alone():
+    """Against the formula, with derivatives by differences of whole calibrations."""
+    robot, _, m = measured("hexapod", {}, noise=1e-6)
+    m = replace(m, sigma=[0.01] * 3 + [2e-5] * 3)
+    names = robot.geometry.match("base?.x")
+    plain = pk.identify(robot, m, "offset*")
+    found = pk.identify(robot, m, "offset*", uncertainty={"consider": {"base?.x": 0.02}})
+    np.testing.assert_array_equal(found.values, plain.values)
+    assert found.nuisances == ()
+    step, added, elsewhere = 1e-3, np.zeros((6, 6)), 0.0
+    poses = pk.sample_poses(robot, 5, seed=9)
+    q = robot.inverse(poses)
+    for name in names:
+        other = robot.replace({name: robot.geometry[name] + step})
+        by = pk.identify(other, m, "offset*")
+        change = (by.values - plain.values) / step * 0.02
+        added += np.outer(change, change)
+        ahead = (by.robot.forward(q).pose - plain.robot.forward(q).pose)[:, :3] / step * 0.02
+        elsewhere = elsewhere + (ahead**2).sum(axis=1)
+    np.testing.assert_allclose(found.covariance - plain.covariance, added, rtol=1e-2, atol=1e-8)
+    np.testing.assert_allclose(
+        found.accuracy(poses) ** 2 - plain.accuracy(poses) ** 2, elsewhere, rtol=2e-2, atol=1e-9
+    )
+
+
+def test_held_out_points_count_with_what_considered_numbers_make_of_them():
+    ratios = []
+    for seed in range(12):
+        robot, _, m = measured("hexapod", {"base*": 0.05, "platform*": 0.05}, seed, kind="position")
+        m = replace(m, sigma=0.01)
+        stated = {"consider": {"base*": 0.05, "platform*": 0.05}}
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            found = pk.identify(robot, m, "offset*", holdout=0.3, uncertainty=stated)
+        ratios.append(found.holdout_rms / found.holdout_expected)
+    assert np.sqrt(np.mean(np.square(ratios))) == pytest.approx(1.0, abs=0.25)
+
+
+def test_consider_needs_exact_actuators_and_numbers_of_the_geometry():
+    robot, _, m = measured("hexapod", {})
+    stated = {"consider": {"gain*": 1e-3}}
+    with pytest.raises(ArgumentError, match="consider needs poses that follow"):
+        pk.identify(robot, replace(m, actuator_sigma=0.01), "offset*", uncertainty=stated)
+    with pytest.raises(ArgumentError, match="no number of the geometry"):
+        pk.identify(robot, m, "offset*", uncertainty={"consider": {"target*": 0.1}})
