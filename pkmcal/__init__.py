@@ -51,6 +51,10 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.diagnostics.verdict import Verdict as Verdict
     from pkmcal.diagnostics.verdict import diagnose as diagnose
     from pkmcal.effects.expansion import Expansion as Expansion
+    from pkmcal.effects.gears import Backlash as Backlash
+    from pkmcal.effects.gears import Coupling as Coupling
+    from pkmcal.effects.gears import Harmonics as Harmonics
+    from pkmcal.effects.sag import Sag as Sag
     from pkmcal.error_model.allocation import Allocation as Allocation
     from pkmcal.error_model.allocation import allocate_tolerance as allocate_tolerance
     from pkmcal.error_model.sensitivity import Sensitivity as Sensitivity
@@ -129,6 +133,8 @@ _HOMES = {
     "compensation.pso": ("SwarmResult", "pso"),
     "core.swarm": ("CONSTRICTION", "SwarmSettings"),
     "effects.expansion": ("Expansion",),
+    "effects.gears": ("Backlash", "Coupling", "Harmonics"),
+    "effects.sag": ("Sag",),
     "error_model.allocation": ("Allocation", "allocate_tolerance"),
     "error_model.sensitivity": ("Sensitivity", "sensitivity", "study_cases"),
     "error_model.tolerance": ("Tolerance", "tolerance"),

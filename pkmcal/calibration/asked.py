@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Literal, cast
 
 from pkmcal.arguments import word, words
-from pkmcal.effects.effect import Effect
+from pkmcal.effects.effect import Changed, Effect
 from pkmcal.effects.expansion import Expansion
 from pkmcal.estimation.loss import LIMITS, LossName
 from pkmcal.estimation.parameters import Known
@@ -50,21 +50,33 @@ def fixed_names(fix: str | Sequence[str]) -> tuple[tuple[str, ...], bool]:
     return tuple(name for name in names if name != DATUM), DATUM in names
 
 
-def effects_on(machine: Calibratable, effects: Any) -> tuple[Effect, ...]:
-    """Effects on this machine, each stated once."""
+def effects_on(
+    machine: Calibratable, effects: Any
+) -> tuple[Calibratable, tuple[Effect, ...], dict[str, float]]:
+    """The machine with the numbers of effects, the other effects on it, each stated once.
+
+    And which numbers effects free, with the deviation of what is known of each.
+    """
     if isinstance(effects, str) or not isinstance(effects, Iterable):
         effects = (effects,)
     found: dict[str, Effect] = {}
+    names: list[str] = []
+    free: dict[str, float] = {}
     for each in effects:
         if not hasattr(each, "of_rows") and not hasattr(each, "of_machine"):
             raise ArgumentTypeError(
                 f"effects: expected such as pk.Expansion(11.5e-6), found {each!r}"
             )
         effect = each.of_machine(machine) if hasattr(each, "of_machine") else each
-        if effect.name in found:
+        if effect.name in names:
             raise ArgumentError(f"effects: {effect.name} is stated more than once")
-        found[effect.name] = effect
-    return tuple(found.values())
+        names.append(effect.name)
+        if isinstance(effect, Changed):
+            machine = effect.machine
+            free |= effect.free
+        else:
+            found[effect.name] = effect
+    return machine, tuple(found.values()), free
 
 
 def now(before: dict[str, Any], others: dict[str, Any]) -> dict[str, Any]:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Literal
 
-from pkmcal.arguments import earlier_keywords, words
+from pkmcal.arguments import earlier_keywords, word, words
 from pkmcal.arms.arm import SerialArm
 from pkmcal.calibration.asked import (
     EARLIER,
@@ -31,6 +33,7 @@ from pkmcal.calibration.steps import (
     without_slack,
 )
 from pkmcal.diagnostics.row_errors import likely_mistakes
+from pkmcal.diagnostics.sag import sag_that_helps
 from pkmcal.effects.effect import Effects
 from pkmcal.estimation.datasets import as_fit_data, by_set
 from pkmcal.estimation.free_parameters import parameters
@@ -59,7 +62,7 @@ def identify(
     per_session: str | Sequence[str] = (),
     fix: str | Sequence[str] = (),
     drop: Drop = None,
-    effects: Effects = (),
+    effects: Effects | Literal["auto"] = (),
     uncertainty: Uncertain = None,
 ) -> Identification:
     """Find the geometry that agrees best with measurements.
@@ -134,8 +137,9 @@ def identify(
         "slack": readings of cables that the others show to be slack, on a machine with more cables
         than needed; the rest of their rows is kept. They are `Identification.slack`; without the
         word a warning names them.
-    effects : sequence of effects
-        What moves the machine off the pose that its geometry gives: ``[pk.Expansion(11.5e-6)]``.
+    effects : sequence of effects, or "auto"
+        What moves the machine off the pose that its geometry gives: ``[pk.Expansion(11.5e-6)]``,
+        of an arm ``[pk.Sag()]``. "auto": sag of an arm, if it helps at poses left out.
     uncertainty : mapping of str to float, optional
         How wrong numbers may be that are neither free nor held by `fix`: standard deviations by
         name or wildcard, mm, rad or 1, later entries before earlier ones, 0 of what is exact. They
@@ -178,15 +182,27 @@ def identify(
     >>> round(found.robot.geometry["offset1"], 6)
     0.3
     """
+    if isinstance(effects, str):
+        word("effects", effects, ("auto",))
+        return _automatic(
+            partial(
+                identify, robot, measurements, free, prior=prior, loss=loss, unknown=unknown,
+                holdout=holdout, bounds=bounds, per_session=per_session,
+                fix=fix, drop=drop,
+            )
+        )  # fmt: skip
     machine = as_machine(robot)
     roles, own = unknown_roles(unknown), words("per_session", per_session)
     fixed, find_datum = fixed_names(fix)
     stated = machine.model.uncertainty.with_later(stated_uncertainty(uncertainty))
-    moving = effects_on(machine, effects)
+    machine, moving, of_effects = effects_on(machine, effects)
     weighed, rule = loss_and_rule(loss)
     given = as_fit_data(machine, measurements, roles, bool(own), moving)
     given, uncertain = uncertain_sets(machine, given, stated)
-    asked = Asked(free, prior, bounds, own, by_set(roles), fixed, frozenset(), stated, uncertain)
+    asked = Asked(
+        free, prior, bounds, own, by_set(roles), fixed,
+        of_effects=of_effects, uncertainty=stated, uncertain_roles=uncertain,
+    )  # fmt: skip
     named, drop_outliers, drop_slack = left_out(drop, sum(len(data.rows) for data in given))
     rows = prepare(machine, given, holdout, named, bool(own))
     chosen = parameters(machine, rows.fitted, asked)
@@ -210,4 +226,17 @@ def identify(
     found = result(rows, fitted, sure, held, find_slack=not drop_slack)
     for text in found.warnings:
         warnings.warn(text, CalibrationWarning, stacklevel=3)  # of who called, beyond the adapter
+    return found
+
+
+def _automatic(identified: Callable[..., Identification]) -> Identification:
+    """The calibration with the sag that helps at poses left out, or else without."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", CalibrationWarning)
+        found = identified(effects=())
+    helps = sag_that_helps(found.fit)
+    if helps is not None and helps.effect is not None:
+        return identified(effects=[helps.effect])
+    for text in found.warnings:
+        warnings.warn(text, CalibrationWarning, stacklevel=4)  # of who called, beyond the adapter
     return found

@@ -14,6 +14,8 @@ import typer
 import pkmcal as pk
 from pkmcal.arguments import word
 from pkmcal.calibration.asked import Role
+from pkmcal.calibration.rigid import rigid_arm
+from pkmcal.cli.effects_option import AUTO, HELP, OPTION, read_effects
 from pkmcal.cli.geometry_options import (
     free_names,
     matching,
@@ -26,6 +28,7 @@ from pkmcal.cli.measured import (
     Columns,
     Controller,
     Ignore,
+    InvertPoses,
     JoinBy,
     ProbeOffset,
     Reading,
@@ -150,6 +153,7 @@ def calibrate(
             " other parts, or separate them with commas.",
         ),
     ] = None,
+    effects: Annotated[list[str] | None, typer.Option(metavar="WORDS", help=HELP)] = None,
     drop: Annotated[
         list[str] | None,
         typer.Option(
@@ -177,6 +181,7 @@ def calibrate(
     columns: Columns = None,
     units: Units = None,
     rotation: Rotation = None,
+    invert_poses: InvertPoses = False,
     probe_offset: ProbeOffset = None,
     tracker: Annotated[
         str | None,
@@ -225,7 +230,15 @@ def calibrate(
     given = pk.load(read.robot(robot))
     machine = as_machine(given)
     reading = Reading(
-        controller, join, ignore or (), rename or (), columns, units, rotation, probe_offset
+        controller,
+        join,
+        ignore or (),
+        rename or (),
+        columns,
+        units,
+        rotation,
+        probe_offset,
+        invert_poses,
     )
     with warnings.catch_warnings(record=True) as doubts:
         warnings.simplefilter("always", pk.CalibrationWarning)
@@ -262,8 +275,13 @@ def calibrate(
         raise ArgumentError(f"--fix {','.join(fix or [])}: no parameter is left free")
     found_rows: dict[Found, bool] = {"outliers": drop_outliers, "slack": drop_slack}
     held_by_datum = ["datum"] if word("--datum", datum, ("none", "auto")) == "auto" else []
+    moving = read_effects(effects or ["none"])
     weight, rule = word("--loss", loss, LIMITS), word("--covariance", covariance, RULES)
     coefficients = read_coefficients("--expansion", expansion or [])
+    if coefficients is not None:
+        if moving == AUTO:
+            raise ArgumentError(f"{OPTION} auto is for arms, --expansion for other machines")
+        moving = [*moving, pk.Expansion(coefficients)]
     with progress("identifying"), warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # the summary has them
         found = pk.identify(
@@ -277,15 +295,16 @@ def calibrate(
             per_session=anew,
             fix=[*fixed, *held_by_datum],
             drop=[*dropped, *(each for each, asked in found_rows.items() if asked)],
-            effects=[] if coefficients is None else [pk.Expansion(coefficients)],
+            effects=moving,
             uncertainty=read_uncertainty(uncertainty or [], consider or [], machine),
         )
+    rigid = rigid_arm(found) if output is not None and urdf else None
     if output is not None:
         with progress("picture"), output.draft() as draft:
             _save(found, draft / "robot.toml", read, robot)
             found.plot(draft / "residuals.png")
             if isinstance(found.robot, pk.SerialArm) and urdf:
-                found.robot.save_urdf(draft / "robot.urdf")
+                (rigid.arm if rigid else found.robot).save_urdf(draft / "robot.urdf")
     if reported is not None:
         with progress("report"), reported.draft() as draft:
             found.report(draft, read.contents(), certificate=stated)
@@ -299,7 +318,8 @@ def calibrate(
             say(f"\ncalibrated robot{last}: {output.paths[0]}")
             say(f"residuals: {output.paths[1]}")
             if urdf:
-                say(f"URDF with the joint errors in its origins: {output.paths[2]}")
+                how = f"; {rigid}" if rigid else ""
+                say(f"URDF with the joint errors in its origins: {output.paths[2]}{how}")
         if reported is not None:
             say(f"\nreport: {reported.paths[0]}")
         written = [each for each in (reported, output) if each is not None]

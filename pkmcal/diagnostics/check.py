@@ -23,7 +23,8 @@ _OPTIONS = {  # what the command line says otherwise than `identify`; None: it h
     ("effects", None): "--expansion",
     ("bounds", None): None,
 }
-_SEVERAL = ("drop", "fix", "loss", "per_session", "unknown")  # more beside what they have
+# arguments that take more beside what they have
+_SEVERAL = ("drop", "effects", "fix", "loss", "per_session", "unknown")
 
 
 @dataclass(frozen=True)
@@ -70,6 +71,8 @@ class Remedy:
     def option(self) -> str | None:
         """The option of ``pkmcal calibrate``; None where it has none."""
         several = isinstance(self.value, tuple)
+        if several and all(hasattr(each, "option") for each in self.value):  # effects
+            return f"--{self.argument} {','.join(each.option for each in self.value)}"
         if not several and (self.argument, self.value) in _OPTIONS:
             return _OPTIONS[self.argument, self.value]
         name = f"--{self.argument.replace('_', '-')}"

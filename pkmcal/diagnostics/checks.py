@@ -5,20 +5,24 @@ from __future__ import annotations
 from pkmcal.diagnostics import (
     causes,
     course,
+    families,
     gain,
     held_out,
     machine,
     noise,
     priors,
     regions,
+    rounded,
     rows,
+    sag,
     search,
     units,
 )
 from pkmcal.diagnostics.diagnosis import verified
 
 CHECKS = verified((
-    *held_out.CHECKS, *units.CHECKS, *machine.CHECKS, *search.CHECKS, *rows.CHECKS, *noise.CHECKS,
-    *priors.CHECKS, *course.CHECKS, *causes.CHECKS, *regions.CHECKS, *gain.CHECKS,
+    *held_out.CHECKS, *units.CHECKS, *families.CHECKS, *machine.CHECKS, *search.CHECKS,
+    *rows.CHECKS, *rounded.CHECKS, *noise.CHECKS, *priors.CHECKS, *course.CHECKS, *causes.CHECKS,
+    *regions.CHECKS, *gain.CHECKS, *sag.CHECKS,
 ))  # fmt: skip
 AT_ONCE = tuple(check for check in CHECKS if check.at_once)

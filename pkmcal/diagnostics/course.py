@@ -7,7 +7,9 @@ import numpy as np
 from pkmcal.diagnostics.check import Check, Level, Remedy, at_most_one
 from pkmcal.diagnostics.displaced import DisplacedTarget, displaced_target
 from pkmcal.diagnostics.drift import Drift, drift
+from pkmcal.diagnostics.late import late
 from pkmcal.diagnostics.measuring_order import MeasuringOrder, measuring_order
+from pkmcal.diagnostics.two_machines import apart
 from pkmcal.fitted.solution import Solution
 
 
@@ -34,6 +36,18 @@ CHECKS = (
         name="measuring-order", about="residuals follow the order of measuring",
         unless=("grave", "drift"), levels=("doubt", "remark"),
         run=lambda found: at_most_one(measuring_order(found.fit, found.outliers)), level_of=_level,
+        say=lambda found, seen: str(seen),
+    ),
+    Check(
+        name="late-readings", about="residuals follow the way from the pose before",
+        unless=("grave",), run=lambda found: at_most_one(late(found)),
+        level_of=lambda found, seen: "doubt" if seen.found else None,
+        say=lambda found, seen: str(seen),
+    ),
+    Check(
+        name="two-machines", about="sets, sessions, halves or every second row want other numbers",
+        unless=("grave", "displaced-target"), run=lambda found: at_most_one(apart(found)),
+        level_of=lambda found, seen: "doubt" if seen.found else None,
         say=lambda found, seen: str(seen),
     ),
     Check(

@@ -111,9 +111,9 @@ class Equations:
         return self.prediction.table
 
     @cached_property
-    def arcs(self) -> tuple[float, ...]:
-        """What takes the misfit of each set to mm: where angles alone were read, the length."""
-        return tuple(m.instrument.arc(m, self.parameters.robot.length) for m in self.table.sets)
+    def arcs(self) -> tuple[FloatArray, ...]:
+        """What takes the residuals of the components (k,) of each set to mm."""
+        return tuple(m.instrument.arcs(m, self.parameters.robot.length) for m in self.table.sets)
 
     @property
     def size(self) -> float:

@@ -14,7 +14,7 @@ import numpy as np
 from pkmcal.arguments import did_you_mean, shown
 from pkmcal.arrays import FloatArray, mm_per_unit
 from pkmcal.estimation.fit_data import PLACE, FitData, Numbers
-from pkmcal.estimation.parameters import FRAME, Asked, Bounds, Parameters, Prior
+from pkmcal.estimation.parameters import FRAME, Asked, Bounds, Parameters
 from pkmcal.estimation.prior_functions import is_function, prior_functions
 from pkmcal.estimation.sessions import Scope, label, matches, scopes
 from pkmcal.estimation.uncertain_numbers import spread, uncertain_names
@@ -24,6 +24,7 @@ from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
 
+_WEIGHT = 100.0  # N, of a link of an arm, more or less
 _LEAST_PRIOR, _MOST_PRIOR = 1e-15, 1e15  # mm or rad, whose squares are numbers
 
 
@@ -78,6 +79,7 @@ def parameters(
     of_unit["1/mm2"] = of_unit["1/mm"] / robot.length
     pull = max(_pull(robot, data.measured) for data in datasets)
     of_unit |= {"1/N": 1.0 / travel / pull, "N": pull / robot.length}
+    of_unit["rad/(N mm)"] = 1.0 / robot.length / (_WEIGHT * robot.length)
     of_number = [np.full(len(places), np.nan)]  # where the unit says the scale
     of_number += [
         np.full(len(each.names), np.nan) if each.scale is None else each.scale
@@ -94,7 +96,7 @@ def parameters(
     count = int(np.count_nonzero(number_of < len(places)))
     found = [n if not own else "" for n, own in zip(names, uncertain, strict=True)]
     lower, upper = _bounds(asked.bounds, found, values, strict=like is None)
-    prior = _prior(asked.prior, found, scale, count, strict=like is None)
+    prior = _prior(asked, found, scale, count, strict=like is None)
     prior[uncertain] = np.sqrt(np.diagonal(of_uncertain))
     made = Parameters(
         names=names,
@@ -151,6 +153,7 @@ def _free_names(robot: Calibratable, asked: Asked) -> tuple[list[str], list[str]
     chosen = geometry.match(free, "free")
     if not chosen:
         raise ArgumentError("free: name at least one parameter")
+    chosen = list(dict.fromkeys([*chosen, *asked.of_effects]))
     held = geometry.match(asked.fix, "fix") if asked.fix else []
     along = uncertain_names(asked.uncertainty, robot, (*chosen, *held))
     if held:
@@ -270,21 +273,25 @@ def _matching(argument: str, pattern: object, names: Sequence[str], strict: bool
 
 
 def _prior(
-    prior: Prior, names: Sequence[str], scale: FloatArray, of_machine: int, strict: bool
+    asked: Asked, names: Sequence[str], scale: FloatArray, of_machine: int, strict: bool
 ) -> FloatArray:
+    """What is known of each parameter: as effects have it, but where `prior` names it."""
+    prior = asked.prior
     sigma = np.full(len(names), np.inf)
-    if prior is None:
-        return sigma
+    of_effects = [asked.of_effects.get(name.partition("@")[0], np.inf) for name in names]
+    if isinstance(prior, Mapping):
+        sigma[:] = of_effects
     if isinstance(prior, Mapping):
         for pattern, value in prior.items():
             if is_function(pattern, value):
                 continue
             hits = _matching("prior", pattern, names, strict)
             sigma[hits] = _positive(f"prior of {pattern}", value)
-    else:
+        return sigma
+    if prior is not None:
         sigma[:of_machine] = _positive("prior", prior) * scale[:of_machine]
         sigma[[is_of_load(name) for name in names]] = np.inf  # forces are no lengths
-    return sigma
+    return np.where(np.isfinite(of_effects), of_effects, sigma)
 
 
 def _positive(what: str, value: object) -> float:

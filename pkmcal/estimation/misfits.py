@@ -96,7 +96,7 @@ def rounding(equations: Equations, noise: FloatArray) -> float:
     """Length of the whitened rounding errors of what is predicted, for noise (G,)."""
     length, readings, sigma = equations.parameters.robot.length, 0.0, equations.closures.sigma
     if equations.system is None or equations.whitening.any_read:
-        parts = [_rounded(m, length) for m in equations.table.sets]
+        parts = [rounding_of(m, length) for m in equations.table.sets]
         readings = float(np.linalg.norm(equations.whitening.whitened(parts, noise)))
     if equations.system is None or sigma is None:
         return readings
@@ -105,7 +105,7 @@ def rounding(equations: Equations, noise: FloatArray) -> float:
     return float(np.hypot(readings, np.linalg.norm(whitened)))
 
 
-def _rounded(measured: Measurements, length: float) -> FloatArray:
+def rounding_of(measured: Measurements, length: float) -> FloatArray:
     """Rounding errors (N, k) of what is predicted, mm and rad."""
     values = measured.values.reshape(len(measured), -1)
     lengths = np.array([unit == "mm" for unit in measured.units], dtype=bool)

@@ -7,7 +7,7 @@ unless some numbers are of a session or set: see `sessions`.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal
 
@@ -46,6 +46,9 @@ class Asked:
         Names or wildcards of numbers of the geometry that are held.
     held_points : frozenset of (str, str)
         Unknown points that are held where the user puts them, by role and name.
+    of_effects : mapping of str to float
+        Numbers of the geometry that effects free beside `free`, and the standard deviation of what
+        is known of each, where `prior` does not name it.
     uncertainty : StatedUncertainty
         How wrong numbers may be that are not free.
     uncertain_roles : frozenset of str
@@ -59,6 +62,7 @@ class Asked:
     by_set: frozenset[str] = frozenset()
     fix: tuple[str, ...] = ()
     held_points: frozenset[tuple[str, str]] = frozenset()
+    of_effects: Mapping[str, float] = field(default_factory=dict)
     uncertainty: StatedUncertainty = NOTHING
     uncertain_roles: frozenset[str] = frozenset()
 

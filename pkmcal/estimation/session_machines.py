@@ -20,7 +20,6 @@ from pkmcal.estimation.tensioned_poses import Cells, tensioned_poses
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.kinematics.drive_state import DriveState
-from pkmcal.kinematics.robot import Robot
 
 AnyArray = TypeVar("AnyArray", FloatArray, Int32Array, BoolArray)
 
@@ -209,7 +208,7 @@ def _lots(rows: IntArray) -> list[IntArray]:
 
 
 def _driven(robot: Calibratable, state: DriveState) -> Calibratable:
-    return state.of(robot) if isinstance(robot, Robot) else robot
+    return state.of(robot)
 
 
 def exact_closures(rows: Sequence[IntArray], read: FloatArray) -> SessionClosures:

@@ -16,6 +16,7 @@ from pkmcal.estimation.parameters import Parameters
 from pkmcal.estimation.uncertain_numbers import spread, uncertain_names, uncertain_sets
 from pkmcal.estimation.uncertainty import Uncertainty
 from pkmcal.exceptions import ArgumentError
+from pkmcal.fitted.later import Later
 from pkmcal.geometry.stated_uncertainty import StatedUncertainty
 
 _LEAST_NOISE = 0.25  # of the residuals' variance, that is noise whatever numbers are considered
@@ -147,3 +148,40 @@ def theta_of(more: Parameters, chosen: Parameters, theta: FloatArray) -> FloatAr
         known.get(name, start)
         for name, start in zip(more.names, more.start.tolist(), strict=True)
     ])  # fmt: skip
+
+
+def considered_errors(
+    rows: Later,
+    equations: Equations,
+    after: Evaluation,
+    uncertainty: Uncertainty,
+    design: FloatArray,
+) -> FloatArray:
+    """Errors (M, k) that considered numbers make in rows held out, mm in their deviations.
+
+    Parameters
+    ----------
+    rows, equations, after : Later, Equations, Evaluation
+        The rows that were held out.
+    uncertainty : Uncertainty
+        Of the fit.
+    design : ndarray (M, p)
+        Of the rows, mm by the basis of the fit.
+    """
+    if uncertainty.considered is None:
+        return np.zeros((len(design), 0))
+    chosen = rows.parameters
+    wide = beside(chosen, rows.data, StatedUncertainty(chosen.asked.uncertainty.consider))
+    assert wide is not None  # as of the fit
+    sets, more = wide
+    other = Equations.of(sets, more)
+    at = other.at(theta_of(more, chosen, after.theta), near=after.states)
+    new = [i for i, name in enumerate(more.names) if name not in chosen.names]
+    jacobian = np.concatenate([
+        (arc[:, None] * part).reshape(-1, part.shape[2])[:, new]
+        for arc, part in zip(equations.arcs, other.jacobian(at), strict=True)
+    ])[equations.whitening.present]  # fmt: skip
+    mine = np.isin(np.flatnonzero(more.uncertain), new)
+    root = np.linalg.cholesky(more.spread[np.ix_(mine, mine)])
+    found: FloatArray = jacobian @ root - design @ uncertainty.considered
+    return found

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.kinematics.calibratable import ArmMachine
 from pkmcal.kinematics.robot import Robot
+
+M = TypeVar("M")
 
 
 class DriveState(NamedTuple):
@@ -28,8 +31,11 @@ class DriveState(NamedTuple):
         """That of some rows, or of one."""
         return DriveState(*(None if each is None else each[rows] for each in self))
 
-    def of(self, robot: Robot) -> Robot:
-        """The robot in this state."""
-        if self.approach is not None:
-            robot = robot.approaching(self.approach)
-        return robot if self.tension is None else robot.tensioned(self.tension)
+    def of(self, machine: M) -> M:
+        """The machine in this state: a robot, or an arm, on which tension does nothing."""
+        found: Any = machine
+        if isinstance(found, Robot | ArmMachine) and self.approach is not None:
+            found = found.approaching(self.approach)
+        if isinstance(found, Robot) and self.tension is not None:
+            found = found.tensioned(self.tension)
+        return cast(M, found)

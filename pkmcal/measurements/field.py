@@ -119,18 +119,6 @@ def integers(name: str, given: ArrayLike, rows: int) -> Int64Array:
     return array.astype(np.int64)
 
 
-def of_actuators(
-    name: str, given: ArrayLike, shape: tuple[int, ...], blank: bool = False
-) -> FloatArray:
-    """Numbers of each actuator (N, n), given for all, for each or for each row."""
-    found = numbers(name, given, blank)
-    if found.shape not in ((), shape[1:], shape):
-        raise ArgumentError(
-            f"{name} must be one number or have shape {shape[1:]} or {shape}; found {found.shape}"
-        )
-    return np.array(np.broadcast_to(found, shape))
-
-
 def one_or_each(name: str, units: Sequence[str], values: FloatArray) -> Iterator[WrittenColumn]:
     """A column for all actuators where they have the same unit and numbers, else one for each."""
     if len(set(units)) == 1 and (values == values[:, :1]).all():

@@ -271,6 +271,13 @@ class Measurements(Result):
         return DriveState(self.approach, tension)
 
     @property
+    def other_drive_state(self) -> DriveState:
+        """`drive_state` at the second place, of distances between two."""
+        state = self.drive_state
+        approach = self.instrument.approached(self.actuators, state.approach)
+        return state._replace(approach=approach)
+
+    @property
     def sessions(self) -> tuple[str, ...]:
         """The different sessions, in the order of their first rows; empty where none is stated."""
         return () if self.session is None else tuple(dict.fromkeys(self.session.tolist()))

@@ -35,6 +35,7 @@ ORDERS = [  # of axes; capitals: each about the turned axis
     for order in itertools.product(letters, repeat=3)
     if order[0] != order[1] != order[2]
 ]
+OWN_ORDER = "xyz"  # of alpha, beta, gamma
 QUATERNIONS = ("wxyz", "xyzw")
 ROTATIONS = (*QUATERNIONS, "rotvec")
 

@@ -15,8 +15,6 @@ from pkmcal.arrays import FloatArray
 from pkmcal.display import first_rows
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.kinematics.calibratable import ArmMachine, Solvable
-from pkmcal.kinematics.drive_state import DriveState
-from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.former import OF_MEASURE, adapted
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.tracker import Tracker
@@ -141,7 +139,7 @@ class VirtualMachine:
             approach=approach,
             tension=tension,
         )
-        exact = blank.instrument.simulated(blank, _Solving(self._machine, blank.drive_state))
+        exact = blank.instrument.simulated(blank, _Solving(self._machine, blank))
         noise, sigma = self._drawn(blank, exact)
         values = blank.instrument.corrected(exact, noise).reshape(blank.values.shape)
         known = blank.instrument.measured()
@@ -165,11 +163,11 @@ class _Solving:
     """The forward kinematics of a machine in the state of its drives."""
 
     machine: Any
-    state: DriveState
+    rows: Measurements
 
     def __call__(self, actuators: FloatArray, argument: str) -> Any:
-        moved = self.state.of(self.machine) if isinstance(self.machine, Robot) else self.machine
-        solved = moved.forward(actuators)
+        state = self.rows.other_drive_state if argument == "other" else self.rows.drive_state
+        solved = state.of(self.machine).forward(actuators)
         failed = np.flatnonzero(~np.asarray(solved.ok)).tolist()
         if failed:
             raise ArgumentError(

@@ -12,7 +12,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Literal, Protocol, TypeVar
+from typing import Any, ClassVar, Literal, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -66,6 +66,26 @@ class Predicted:
     by: Mapping[str, FloatArray] = field(default_factory=dict)
     by_frame: FloatArray | None = None
     by_other: FloatArray | None = None
+
+
+class Family(NamedTuple):
+    """Components of a reading that have one unit.
+
+    Attributes
+    ----------
+    unit : str
+        Their unit.
+    columns : tuple of int
+        Which they are.
+    """
+
+    unit: str
+    columns: tuple[int, ...] = ()
+
+    @property
+    def noun(self) -> str:
+        """What they are called."""
+        return {"mm": "lengths", "rad": "angles"}.get(self.unit, f"readings in {self.unit}")
 
 
 def joined(parts: Sequence[Predicted], rows_of: Sequence[IntArray]) -> Predicted:
@@ -252,20 +272,22 @@ class Reading:
                 )
         return mm_per_unit(self.units, length)
 
-    def arc(self, m: Measured, length: float) -> float:
-        """What takes its misfit to mm: where angles alone are read, the machine's length."""
-        if "mm" in self.units:
-            return 1.0
-        return float(np.median(self.mm(m, length))) if self.units else length
+    @property
+    def families(self) -> tuple[Family, ...]:
+        """Its components by their unit: what may be wrong by itself, lengths or angles, say."""
+        return tuple(
+            Family(unit, tuple(k for k, each in enumerate(self.units) if each == unit))
+            for unit in dict.fromkeys(self.units)
+        )
+
+    def arcs(self, m: Measured, length: float) -> FloatArray:
+        """What takes a residual of each component to mm (k,): one number for all rows."""
+        each = self.mm(m, length)
+        return np.asarray(np.median(each, axis=0) if each.ndim > 1 else each, dtype=np.float64)
 
     def distance_per_point(self, residual: FloatArray, m: Measured, length: float) -> FloatArray:
-        """How far off each measured point is, mm (N,); of poses their position.
-
-        Where no lengths were read, what the residuals are worth at a characteristic length, mm.
-        """
-        if "mm" in self.units:
-            residual = residual[:, np.array(self.units) == "mm"]
-        elif self.units:
+        """How far off each measured point is, mm (N,); angles count as their arc."""
+        if self.units:
             residual = residual * self.mm(m, length)
         off: FloatArray = np.linalg.norm(residual, axis=1)
         return off
@@ -332,6 +354,13 @@ class Reading:
             if isinstance(value, np.ndarray):
                 value.setflags(write=False)
         return dataclasses.replace(self, **changes)  # type: ignore[type-var]
+
+    def approached(self, actuators: FloatArray, first: FloatArray | None) -> FloatArray | None:
+        """From where actuators (N, n) came to the second place of each row, (N, n).
+
+        `first` is from where they came to the first; None: not known.
+        """
+        return first
 
     # words ----------------------------------------------------------------------------------------
 
