@@ -28,6 +28,7 @@ from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.free_parameters import parameters
 from pkmcal.estimation.loss import LossName
 from pkmcal.estimation.parameters import Asked, Parameters
+from pkmcal.estimation.pose_minima import solved_in_least_minima
 from pkmcal.estimation.starts import known_distances
 from pkmcal.estimation.uncertainty import (
     LinearModel,
@@ -220,7 +221,7 @@ class Fitted:
 def solve(problem: Problem, loss: LossName) -> Fitted:
     """Search from the start of the problem."""
     estimator = problem.estimator(loss)
-    return Fitted(problem, estimator, estimator.solve())
+    return Fitted(problem, estimator, solved_in_least_minima(estimator))
 
 
 def with_datum(fitted: Fitted, rows: Rows, asked: Asked) -> Fitted:

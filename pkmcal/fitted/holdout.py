@@ -22,6 +22,7 @@ from pkmcal.fitted.distances import Distances, distances
 from pkmcal.fitted.held_points import HeldFamily, families, odd_rows, points
 from pkmcal.fitted.later import Later, OwnNumbers, compared, later
 from pkmcal.measurements.measurements import Measurements
+from pkmcal.result import ReadOnly
 from pkmcal.statistics.holdout_test import HoldoutTest
 
 _LOOSE = 1e-6  # share of a number in combinations that its session's rows do not show
@@ -29,7 +30,7 @@ _FEW_ODD = 0.25  # share of held-out points that may be off without the rest bei
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class HeldOut:
+class HeldOut(ReadOnly):
     """Errors of the points held out, mm; NaN where there are none.
 
     Attributes

@@ -19,6 +19,7 @@ from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.estimate import Estimate
 from pkmcal.estimation.estimator import Estimator
 from pkmcal.estimation.evaluation import Evaluation
+from pkmcal.estimation.pose_minima import in_least_minima, solved_in_least_minima, squares_of_poses
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.kinematics.calibratable import Calibratable
@@ -116,27 +117,19 @@ def _without_each(
     slack moves them far; the geometry is held.
     """
     evaluation, noise = estimate.evaluation, estimate.state.noise
-    before = _squares(equations, evaluation, noise)[poses]
+    before = squares_of_poses(equations, evaluation, noise)[poses]
     shape = (len(poses), equations.closures.equations)
     gain, longer = np.zeros(shape), np.zeros(shape)
     for k in range(shape[1]):
         cells = [(pose, k) for pose in poses.tolist()]
         other = equations.without_closures([*equations.slack_cells, *cells], evaluation)
-        there = other.at(evaluation.theta, noise, evaluation)
+        there = in_least_minima(other, other.at(evaluation.theta, noise, evaluation), noise)
         gain[:, k] = np.where(
-            there.status[poses] == 0, before - _squares(other, there, noise)[poses], 0.0
+            there.status[poses] == 0, before - squares_of_poses(other, there, noise)[poses], 0.0
         )
         off, _ = other.closures.residual(there.machines, there.states)
         longer[:, k] = -off[poses, k]
     return gain, longer * np.sign(_slopes(equations, evaluation))[poses]
-
-
-def _squares(equations: Equations, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
-    """Squared residuals of each pose (K,)."""
-    found = np.zeros(len(equations.table.actuators))
-    blocks = equations.blocks
-    found[blocks.pose_of_block] = blocks.squares(equations.residual(evaluation, noise))
-    return found
 
 
 def taut(
@@ -156,7 +149,7 @@ def taut(
         return equations, ()
     for k in range(_ROUNDS):
         estimator = estimator_at(equations, commanded, start, "cauchy")
-        estimate = estimator.solve()
+        estimate = solved_in_least_minima(estimator)
         longer, _ = _longer(equations, estimate)
         kept = {key: cell for key, cell in cells.items() if longer[key] > -_TOO_SHORT}
         more = _slack_cells(estimator, estimate)

@@ -13,6 +13,7 @@ from pkmcal.arrays import FloatArray, rms
 from pkmcal.calibration.identification import Identification
 from pkmcal.effects.expansion import REFERENCE, coefficients, temperatures
 from pkmcal.estimation.identifiability import listed
+from pkmcal.estimation.uncertainty import stated_variances
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files import reading
 from pkmcal.files.toml_lines import Source
@@ -146,7 +147,7 @@ def budget(found: Identification, stated: Statement, predicted: FloatArray) -> B
                 remark=remark,
             )
         )
-    lines += _misfit(found)
+    lines += _misfit(found, stated)
     if np.isfinite(stated.temperature):
         length = float(np.linalg.norm(found.fit.start.pose[:, :3], axis=1).max())
         mean = stated.temperature - REFERENCE
@@ -194,18 +195,43 @@ def _same_heat(found: Identification, stated: Statement) -> None:
         )
 
 
-def _misfit(found: Identification) -> list[Contribution]:
+def _shared_noise(found: Identification, stated: Statement) -> float:
+    """What residuals scatter by and U of the instrument holds already, mm: its noise.
+
+    As good as `sigma` says, and no more than the instrument's own uncertainty; 0 where one of them
+    is not stated.
+    """
+    variances = [stated_variances(each) for each in found.fit.equations.table.sets]
+    known = [np.mean(each) for each in variances if each is not None]
+    if not known or len(known) < len(variances) or not np.isfinite(stated.expanded):
+        return 0.0
+    return min(float(np.sqrt(np.mean(known))), stated.expanded / stated.factor)
+
+
+def _beyond(scatter: float, noise: float) -> float:
+    """A scatter without the noise that it holds, mm."""
+    return float(np.sqrt(max(scatter**2 - noise**2, 0.0)))
+
+
+def _of_noise(noise: float) -> str:
+    """Whether a scatter holds the noise of the instrument, in words."""
+    if noise:
+        return f"less the noise of the instrument, {noise:.3g} mm, which its U holds"
+    return "noise of the instrument included"
+
+
+def _misfit(found: Identification, stated: Statement) -> list[Contribution]:
     """What machine and model miss: repeats tell one from the other."""
-    sure = found.fit.uncertainty
+    sure, noise = found.fit.uncertainty, _shared_noise(found, stated)
     split = sure.repeats(plain=True)
     if np.isfinite(found.repeatability):
         missed = found.lack_of_fit_chance < SIGNIFICANT
         return [
             Contribution(
                 "repeatability",
-                found.repeatability,
+                _beyond(found.repeatability, noise),
                 dof=split.pure_freedom,
-                remark="scatter of repeated poses, noise of the instrument included",
+                remark=f"scatter of repeated poses, {_of_noise(noise)}",
             ),
             Contribution(
                 "lack of fit",
@@ -221,9 +247,10 @@ def _misfit(found: Identification) -> list[Contribution]:
     return [
         Contribution(
             "repeatability and lack of fit",
-            float(np.sqrt(known.mean())),
+            _beyond(float(np.sqrt(known.mean())), noise),
             dof=max(sure.fit.freedom, 0.0) or float("inf"),
-            remark="residuals; no pose was repeated, which would tell one from the other",
+            remark=f"residuals, {_of_noise(noise)}; no pose was repeated, which would tell one"
+            " from the other",
         )
     ]
 
