@@ -118,7 +118,8 @@ def considered_places(chosen: Parameters) -> tuple[IntArray, FloatArray]:
     free = [geometry.names[place] for place in chosen.places]
     names = uncertain_names(stated, chosen.robot, free)
     places = np.array([geometry.names.index(name) for name in names], dtype=np.intp)
-    return places, np.linalg.cholesky(spread(stated, names))
+    root: FloatArray = np.linalg.cholesky(spread(stated, names)).astype(np.float64)
+    return places, root
 
 
 def beside(

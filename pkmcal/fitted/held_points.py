@@ -101,7 +101,8 @@ class Points:
         added: FloatArray = np.einsum(
             "ij,jk,ik->i", self.design, uncertainty.by_cluster, self.design
         )
-        return added + (self.considered**2).sum(axis=1)
+        added += (self.considered**2).sum(axis=1)
+        return added
 
     def whole(self, uncertainty: Uncertainty) -> tuple[FloatArray, FloatArray]:
         """Design (M, p + k) of all that makes an error, and the covariance of that."""
