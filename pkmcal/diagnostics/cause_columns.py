@@ -9,12 +9,13 @@ from typing import NamedTuple
 import numpy as np
 
 from pkmcal import screw
-from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.fitted.fit import Fit
 from pkmcal.fitted.held_numbers import held_numbers
 from pkmcal.geometry.stated_uncertainty import SCALE, StatedUncertainty
 
+_LEAST_TRAVEL = 0.02  # of the machine's length, from which a place is more than an error
 _LEAST_WAY = 1e-9  # of the machine's length, below which actuators have not moved
 
 
@@ -76,13 +77,24 @@ def _before(fit: Fit) -> IntArray:
     return before
 
 
+def _travelled(fit: Fit, ways: FloatArray) -> BoolArray:
+    """Along which axes (d,) the machine has travelled.
+
+    Where it was to stay, as at the height at which a probe touches, its place is the error itself.
+    """
+    travelled: BoolArray = np.ptp(ways, axis=0) > _LEAST_TRAVEL * fit.end.robot.length
+    return travelled
+
+
 def _lag(fit: Fit) -> FloatArray | None:
     """The platform was still on its way: a part of the way back to the pose before."""
     before, motions = _before(fit), screw.from_pose(fit.end.pose)
     back = motions[before] @ np.linalg.inv(motions)
     turn = screw.log(back)[:, :3]
     way = fit.end.pose[before, :3] - fit.end.pose[:, :3]
-    return _moved(fit, np.concatenate([turn, way], axis=1)[:, :, None])
+    twist = np.concatenate([turn, way], axis=1)
+    arcs = twist * np.repeat([fit.end.robot.length, 1.0], 3)
+    return _moved(fit, np.where(_travelled(fit, arcs), twist, 0.0)[:, :, None])
 
 
 def _play(fit: Fit) -> FloatArray | None:
@@ -107,6 +119,7 @@ def _warming(fit: Fit) -> FloatArray | None:
 def _by_place(fit: Fit) -> FloatArray | None:
     """All actuators are longer by where the machine is: along x, y and z."""
     place = fit.end.pose[:, :3] - fit.end.pose[:, :3].mean(axis=0)
+    place = np.where(_travelled(fit, place), place, 0.0)
     return _moved(fit, _by_actuators(fit).sum(axis=2, keepdims=True) * place[:, None, :])
 
 
