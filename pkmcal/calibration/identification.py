@@ -29,9 +29,8 @@ from pkmcal.effects.expansion import in_words as heat_in_words
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.fitted.held_numbers import considered_places
 from pkmcal.fitted.row_names import row_names
-from pkmcal.fitted.solution import Solution
+from pkmcal.fitted.solution import Machine, Solution
 from pkmcal.kinematics.calibratable import as_machine
-from pkmcal.kinematics.robot import Robot
 from pkmcal.result import Result
 
 if TYPE_CHECKING:
@@ -42,7 +41,7 @@ _ALIKE = 9  # decimals to which correlations differ that are not equal
 _UNIDENTIFIABLE = 1e-3  # mm a pose moves per mm along an unidentifiable combination
 
 
-class Identification(Solution, Result):
+class Identification(Solution[Machine], Result):
     """What `identify` found. Arrays are in the order of `free`; mm and rad.
 
     Its numbers are attributes that its base classes describe: `Solution`, and `HeldOut` for points
@@ -145,7 +144,7 @@ class Identification(Solution, Result):
             "change": self.values - self.start,
         }
 
-    def robot_of(self, session: str) -> Robot | SerialArm:
+    def robot_of(self, session: str) -> Machine:
         """The machine with the numbers that it had in a session.
 
         Parameters

@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Literal
+from typing import Literal, TypeVar, cast
 
 from pkmcal.arguments import earlier_keywords, word, words
 from pkmcal.arms.arm import SerialArm
@@ -47,10 +47,12 @@ from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
 
+Given = TypeVar("Given", bound=Robot | SerialArm)
+
 
 @earlier_keywords(*EARLIER, now=now)
 def identify(
-    robot: Robot | SerialArm,
+    robot: Given,
     measurements: Measurements | Sequence[Measurements],
     free: str | Sequence[str] | None = None,
     *,
@@ -64,7 +66,7 @@ def identify(
     drop: Drop = None,
     effects: Effects | Literal["auto"] = (),
     uncertainty: Uncertain = None,
-) -> Identification:
+) -> Identification[Given]:
     """Find the geometry that agrees best with measurements.
 
     Weighted least squares on the measured quantities, through the forward kinematics and its
@@ -226,10 +228,10 @@ def identify(
     found = result(rows, fitted, sure, held, find_slack=not drop_slack)
     for text in found.warnings:
         warnings.warn(text, CalibrationWarning, stacklevel=3)  # of who called, beyond the adapter
-    return found
+    return cast("Identification[Given]", found)  # an arm for an arm
 
 
-def _automatic(identified: Callable[..., Identification]) -> Identification:
+def _automatic(identified: Callable[..., Identification[Given]]) -> Identification[Given]:
     """The calibration with the sag that helps at poses left out, or else without."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", CalibrationWarning)

@@ -57,7 +57,7 @@ def coarse_readings(
     if equations.closures.unknowns:
         return ()
     variances = equations.whitening.variances(factors)
-    component = _components(equations)
+    component = component_of(equations)
     found = []
     for i, measured in enumerate(equations.table.sets):
         values = measured.values.reshape(len(measured), -1)
@@ -77,7 +77,7 @@ def coarse_readings(
     return tuple(found)
 
 
-def _components(equations: Equations) -> IntArray:
+def component_of(equations: Equations) -> IntArray:
     """Number of the component of each equation (M,) in its set."""
     every = [np.tile(np.arange(len(m.components)), len(m)) for m in equations.table.sets]
     component: IntArray = np.concatenate(every)[equations.whitening.present]

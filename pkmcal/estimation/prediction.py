@@ -358,5 +358,9 @@ def _add_motion(
 
     `by_twist` is (N, k, 6), `place` (N,) which of the twists moves each row; `NONE`: none of them.
     """
+    into = part[:, :, : twists.shape[2]]
+    if np.array_equal(place, np.arange(len(twists))):  # each its own: copies would take most time
+        into += by_twist @ twists
+        return
     moved = np.flatnonzero(place != NONE)
-    part[moved, :, : twists.shape[2]] += by_twist[moved] @ twists[place[moved]]
+    into[moved] += by_twist[moved] @ twists[place[moved]]

@@ -34,7 +34,7 @@ def runs_apart(
             for run, place in zip(runs, _places(measured), strict=True)
         ]
         if named != runs:
-            instrument = replace(measured.instrument, run=np.array(named))  # type: ignore[call-arg]
+            instrument = measured.instrument.with_fields({"run": np.array(named)})
             measured = replace(measured, instrument=instrument)
         found.append(measured)
     return found

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, IntArray
-from pkmcal.estimation.coarse_readings import Coarse, coarse_readings
+from pkmcal.estimation.coarse_readings import Coarse, coarse_readings, component_of
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.estimate import Estimate
 from pkmcal.estimation.estimator import FEW, Estimator
@@ -167,21 +167,21 @@ class Uncertainty:
     @cached_property
     def _place(self) -> IntArray:
         """Which component of its row each equation is (M,)."""
-        every = [np.tile(np.arange(len(m.components)), len(m)) for m in self.equations.table.sets]
-        return np.concatenate(every)[self.equations.whitening.present]
+        return component_of(self.equations)
 
     @cached_property
     def noises(self) -> tuple[Noise, ...]:
         """Variances in mm² of a length of each set; NaN where nothing shows them."""
         return tuple(self.noise_of(i) for i in range(len(self.equations.table.sets)))
 
-    def _rounding(self, i: int) -> float:
-        """The largest variance that rounding alone gives a length of set `i`, mm²."""
-        units, arcs = self.equations.table.sets[i].units, self.equations.arcs[i]
+    def _rounding(self, i: int, family: int) -> float:
+        """The largest variance that rounding alone gives one family of set `i`, mm²."""
+        columns = self.equations.table.sets[i].instrument.families[family].columns
+        arcs = self.equations.arcs[i]
         floors = [
-            float(arcs[each.component] * each.floor)
+            float(arcs[each.component]) * each.floor
             for each in self.coarse
-            if each.set == i and (units[each.component] == "mm" or "mm" not in units)
+            if each.set == i and each.component in columns
         ]
         return max(floors, default=0.0) ** 2
 
@@ -209,7 +209,7 @@ class Uncertainty:
         mine = self.family_of(i, family) if family else self.lengths_of(i)
         retained = self.covariance.sandwich.retained[mine]
         total, shared = noise(self.adjusted[mine], retained, numbered(self.fit.key[mine]))
-        return max(total, self._rounding(i)), shared
+        return max(total, self._rounding(i, family)), shared
 
     def stated_variances(self, i: int, family: int = 0) -> FloatArray | None:
         """`stated_variances` of set `i` in mm², of angles those of their arcs."""

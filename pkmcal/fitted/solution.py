@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any, Generic
 
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import BoolArray, FloatArray, IntArray
@@ -17,6 +17,15 @@ from pkmcal.fitted.nuisances import Nuisance
 from pkmcal.fitted.slack import SlackCable
 from pkmcal.kinematics.robot import Robot
 from pkmcal.statistics.prior_test import PriorTest
+
+if TYPE_CHECKING:  # which brings its own; the module is of Python 3.13 and later
+    from typing_extensions import TypeVar
+
+    Machine = TypeVar("Machine", bound=Robot | SerialArm, default=Robot | SerialArm, covariant=True)
+else:
+    from typing import TypeVar
+
+    Machine = TypeVar("Machine")  # what `identify` was given
 
 _NAMES = (  # of `to_dict`, in the order in which they are written
     "verdict", "robot", "free", "units", "values", "start", "stderr", "parameter_dof", "interval95",
@@ -35,7 +44,7 @@ _NAMES = (  # of `to_dict`, in the order in which they are written
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Solution(HeldOut):
+class Solution(HeldOut, Generic[Machine]):
     """A solved calibration: every number that was found, each under one name.
 
     Those of points that were not fitted are described in the base class, `HeldOut`.
@@ -232,14 +241,14 @@ class Solution(HeldOut):
     repeatability: float
     lack_of_fit: float
     lack_of_fit_chance: float
-    robot: Robot | SerialArm
+    robot: Machine
     fit: Fit
     converged: bool
     evaluations: int
     history: tuple[float, ...]
     prior_test: PriorTest | None = None
     uncertainty_test: PriorTest | None = None
-    robots: Mapping[str, Robot | SerialArm] = field(default_factory=dict)
+    robots: Mapping[str, Machine] = field(default_factory=dict)
     datum: Datum = NO_DATUM
     dropped: tuple[int, ...] = ()
     dropped_names: str = ""

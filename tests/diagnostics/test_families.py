@@ -106,8 +106,8 @@ def test_wrong_angles_are_not_calibrated_from(hexapod: pk.Robot, mistake: str) -
 @pytest.mark.parametrize("name", ["2tpr2tps", "6-rus", "arm"])
 def test_wrong_angles_are_not_calibrated_from_on_other_machines(name: str, mistake: str) -> None:
     machine = ARM if name == "arm" else pk.load(name)
-    if name == "2tpr2tps" and mistake == "gamma reversed":
-        pytest.skip("it does not turn about z")
+    if name == "2tpr2tps" and mistake in ("gamma reversed", "YZX"):
+        pytest.skip("it does not turn about z: nothing is mistaken")
     assert not_calibrated(judged(machine, MISTAKES[mistake]))
 
 

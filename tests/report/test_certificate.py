@@ -134,7 +134,7 @@ def test_the_page_begins_with_what_is_stated(folder: Path, found: pk.Identificat
 
 def test_it_states_which_rows_were_left_out(stated: Path, tmp_path: Path) -> None:
     """Who signs has to see it, above the signature and not only in the report behind."""
-    measured = calibrated(2)[1].fit.equations.sets[0]
+    measured = calibrated(2)[1].fit.equations.table.sets[0]
     gross = measured.values.copy()
     gross[4] += 2.0
     rows = pk.Measurements(measured.actuators, gross)
