@@ -50,6 +50,7 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.diagnostics.moved import Moved as Moved
     from pkmcal.diagnostics.verdict import Verdict as Verdict
     from pkmcal.diagnostics.verdict import diagnose as diagnose
+    from pkmcal.effects.elasticity import Elasticity as Elasticity
     from pkmcal.effects.expansion import Expansion as Expansion
     from pkmcal.effects.gears import Backlash as Backlash
     from pkmcal.effects.gears import Coupling as Coupling
@@ -132,6 +133,7 @@ _HOMES = {
     "compensation.program": ("CorrectedProgram", "compensate_program"),
     "compensation.pso": ("SwarmResult", "pso"),
     "core.swarm": ("CONSTRICTION", "SwarmSettings"),
+    "effects.elasticity": ("Elasticity",),
     "effects.expansion": ("Expansion",),
     "effects.gears": ("Backlash", "Coupling", "Harmonics"),
     "effects.sag": ("Sag",),

@@ -72,6 +72,29 @@ def sag_term(joint: int, link: int, axis: int) -> Term:
     return Term(joint, "sag", 3 * link + axis)
 
 
+class Memo:
+    """φ at the coordinates that were asked for last, which no other numbers of a law change.
+
+    A search asks for the same ones at each step.
+    """
+
+    def __init__(self) -> None:
+        self._last: tuple[FloatArray, FloatArray] | None = None
+
+    def of(self, theta: FloatArray) -> FloatArray | None:
+        """φ at these coordinates, where it is known."""
+        last = self._last
+        return last[1] if last is not None and np.array_equal(last[0], theta) else None
+
+    def keep(self, theta: FloatArray, basis: FloatArray) -> None:
+        """Know φ at these coordinates; who is given it changes nothing of it."""
+        basis.flags.writeable = False
+        self._last = theta.copy(), basis
+
+    def __reduce__(self) -> tuple[type[Memo], tuple[()]]:
+        return Memo, ()
+
+
 @dataclass(frozen=True, eq=False)
 class JointLaws:
     """The laws of all joints of an arm.
@@ -94,6 +117,8 @@ class JointLaws:
         Their centres at zero, in the base, mm.
     approach : ndarray (n,) or (N, n), or None
         +1 where a joint's reading had grown, -1 where it had fallen, 0 where that is not known.
+    memo : Memo
+        Of φ; shared by laws that differ in the values of their numbers alone.
     """
 
     axes: FloatArray
@@ -103,7 +128,8 @@ class JointLaws:
     gravity: tuple[float, float, float] = GRAVITY
     masses: FloatArray | None = None
     centres: FloatArray | None = None
-    approach: FloatArray | None = field(default=None)
+    approach: FloatArray | None = None
+    memo: Memo = field(default_factory=lambda: Memo())
 
     def __post_init__(self) -> None:
         n = len(self.axes)
@@ -165,11 +191,12 @@ class JointLaws:
 
     def with_terms(self, terms: Iterable[Term]) -> JointLaws:
         """With these numbers beside its own, 0 where they are new."""
-        return replace(self, numbers=dict.fromkeys(terms, 0.0) | dict(self.numbers))
+        numbers = dict.fromkeys(terms, 0.0) | dict(self.numbers)
+        return replace(self, numbers=numbers, memo=Memo())
 
     def approaching(self, approach: FloatArray) -> JointLaws:
         """With joints that come from there, (n,) or (N, n)."""
-        return replace(self, approach=approach)
+        return replace(self, approach=approach, memo=Memo())
 
     # what joints add ------------------------------------------------------------------------------
 
@@ -181,6 +208,13 @@ class JointLaws:
 
     def basis(self, theta: FloatArray) -> FloatArray:
         """φ of each number, (N, k)."""
+        known = self.memo.of(theta)
+        if known is None:
+            known = self._basis(theta)
+            self.memo.keep(theta, known)
+        return known
+
+    def _basis(self, theta: FloatArray) -> FloatArray:
         found = np.zeros((len(theta), len(self.terms)))
         products = self._products(theta) if self._pulled else None
         for c, (joint, kind, of) in enumerate(self.terms):

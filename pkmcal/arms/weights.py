@@ -60,10 +60,8 @@ def gravity_torques(
 
     Parameters
     ----------
-    arm : SerialArm
-        With its own joint errors.
-    theta : array_like (..., n)
-        Joint coordinates, rad and mm.
+    arm, theta
+        As for `link_motions`.
     masses : array_like (n,)
         Of the link behind each joint, kg.
     centres : array_like (n, 3)

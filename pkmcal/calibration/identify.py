@@ -23,7 +23,6 @@ from pkmcal.calibration.identification import Identification
 from pkmcal.calibration.steps import (
     begin,
     compare,
-    judged,
     prepare,
     result,
     solve,
@@ -41,7 +40,6 @@ from pkmcal.estimation.parameters import Asked, Bounds, Prior
 from pkmcal.estimation.uncertain_numbers import uncertain_sets
 from pkmcal.exceptions import ArgumentError, CalibrationWarning
 from pkmcal.fitted.dropped import Drop, left_out
-from pkmcal.fitted.held_numbers import with_considered
 from pkmcal.geometry.stated_uncertainty import Uncertain, stated_uncertainty
 from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.kinematics.robot import Robot
@@ -141,6 +139,7 @@ def identify(
         word a warning names them.
     effects : sequence of effects, or "auto"
         What moves the machine off the pose that its geometry gives: ``[pk.Expansion(11.5e-6)]``,
+        by loads of the rows ``[pk.Elasticity("offset*")]``,
         of an arm ``[pk.Sag()]``. "auto": sag of an arm, if it helps at poses left out.
     uncertainty : mapping of str to float, optional
         How wrong numbers may be that are neither free nor held by `fix`: standard deviations by
@@ -214,18 +213,17 @@ def identify(
             rows, problem = without_outliers(rows, problem, chosen)
         if drop_slack:
             problem = without_slack(problem)
-        fitted = solve(problem, weighed)
+        fit = solve(problem, weighed, rule)
         if find_datum:
-            fitted = with_datum(fitted, rows, asked)
+            fit = with_datum(fit, rows, asked)
     except ValueError as error:
         hint = likely_mistakes(rows.fitted, chosen, problem.start)
         if not hint and not problem.start.ok:
             hint = ["check units, signs and columns of their actuators, or leave these rows out"]
         raise ArgumentError("; ".join([f"measurements: {error}", *hint])) from None
-    fitted = with_component_noise(fitted)
-    sure = with_considered(judged(fitted, rule), fitted.estimate.evaluation, stated)
-    rows, held = compare(rows, fitted, sure, drop_outliers)
-    found = result(rows, fitted, sure, held, find_slack=not drop_slack)
+    fit = with_component_noise(fit)
+    rows, held = compare(rows, fit, drop_outliers)
+    found = result(rows, fit, held, find_slack=not drop_slack)
     for text in found.warnings:
         warnings.warn(text, CalibrationWarning, stacklevel=3)  # of who called, beyond the adapter
     return cast("Identification[Given]", found)  # an arm for an arm

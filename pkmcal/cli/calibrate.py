@@ -52,6 +52,7 @@ from pkmcal.fitted.dropped import Found
 from pkmcal.kinematics.calibratable import Calibratable, as_machine
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.tracker import Tracker
+from pkmcal.readings.unknowns import POINT
 from pkmcal.report.as_json import as_json
 from pkmcal.statistics.covariance import RULES
 
@@ -407,7 +408,7 @@ def read_tracker(text: str) -> Tracker:
 
 
 def _seen_by(tracker: Tracker, measured: Measurements) -> Measurements:
-    if measured.kind != "position":
+    if measured.instrument.components != POINT:
         raise ArgumentError(
             f"--tracker: a tracker measures positions, the file has {measured.kind}s"
         )

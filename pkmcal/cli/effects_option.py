@@ -1,4 +1,4 @@
-"""The option ``--effects``: what moves an arm off the pose that its geometry gives, in words."""
+"""The option ``--effects``: what moves a machine off the pose of its geometry, in words."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, Literal
 
 from pkmcal.arguments import did_you_mean
+from pkmcal.effects.elasticity import Elasticity
 from pkmcal.effects.gears import Backlash, Coupling, Harmonics
 from pkmcal.effects.sag import Sag
 from pkmcal.exceptions import ArgumentError
@@ -15,8 +16,10 @@ OPTION = "--effects"
 AUTO = "auto"
 HELP = (
     "What arms do beside their geometry: sag, the joints that gravity turns most; sag=all,"
-    " sag=2:3:5, sag=tied by known masses; harmonics=1:2 waves a turn; coupling=5.4, joint 5 turned"
-    " by 4; backlash; auto: what helps at poses left out; none. Separate several with commas."
+    " sag=2:3:5, sag=tied by known masses; harmonics=1:2 waves a turn, harmonics=200@3 of joint 3;"
+    " coupling=5.4, joint 5 turned by 4; backlash; auto: what helps at poses left out; none."
+    " Of other machines elasticity=offset*, compliances of legs and screws, by loads of the rows."
+    " Separate several with commas."
 )
 
 
@@ -62,7 +65,9 @@ def _sag(of: str) -> Sag:
 
 
 def _harmonics(of: str) -> Harmonics:
-    return Harmonics([typed(each) for each in of.split(":")])
+    waves, _, joints = of.partition("@")
+    found = [typed(each) for each in waves.split(":")]
+    return Harmonics(found, _joints(joints)) if joints else Harmonics(found)
 
 
 def _coupling(of: str) -> Coupling:
@@ -74,6 +79,10 @@ def _backlash(of: str) -> Backlash:
     return Backlash(_joints(of)) if of else Backlash()
 
 
+def _elasticity(of: str) -> Elasticity:
+    return Elasticity(of.split(":")) if of else Elasticity()
+
+
 def _joints(of: str) -> tuple[int, ...]:
     return tuple(int(each) for each in of.split(":"))
 
@@ -83,10 +92,12 @@ _READ: dict[str, Callable[[str], Any]] = {
     "harmonics": _harmonics,
     "coupling": _coupling,
     "backlash": _backlash,
+    "elasticity": _elasticity,
 }
 _FORMS = {
     "sag": "sag, sag=all, sag=tied or joints, sag=2:3",
-    "harmonics": "waves a turn, harmonics=1:2",
+    "harmonics": "waves a turn, harmonics=1:2, or of some joints, harmonics=200@3",
     "coupling": "a joint and the one that turns it, coupling=5.4:6.4",
     "backlash": "backlash, or joints, backlash=1:2",
+    "elasticity": "names of numbers, elasticity=offset*:rod*",
 }

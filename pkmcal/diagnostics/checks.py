@@ -8,6 +8,7 @@ from pkmcal.diagnostics import (
     families,
     gain,
     held_out,
+    loads,
     machine,
     noise,
     priors,
@@ -17,12 +18,13 @@ from pkmcal.diagnostics import (
     sag,
     search,
     units,
+    waves,
 )
 from pkmcal.diagnostics.diagnosis import verified
 
 CHECKS = verified((
-    *held_out.CHECKS, *units.CHECKS, *families.CHECKS, *machine.CHECKS, *search.CHECKS,
-    *rows.CHECKS, *rounded.CHECKS, *noise.CHECKS, *priors.CHECKS, *course.CHECKS, *causes.CHECKS,
-    *regions.CHECKS, *gain.CHECKS, *sag.CHECKS,
+    *held_out.CHECKS, *units.CHECKS, *families.CHECKS, *machine.CHECKS, *loads.CHECKS,
+    *search.CHECKS, *rows.CHECKS, *rounded.CHECKS, *noise.CHECKS, *priors.CHECKS, *course.CHECKS,
+    *causes.CHECKS, *regions.CHECKS, *gain.CHECKS, *sag.CHECKS, *waves.CHECKS,
 ))  # fmt: skip
 AT_ONCE = tuple(check for check in CHECKS if check.at_once)

@@ -52,6 +52,12 @@ class Harmonics:
         of = "" if self.joints == "all" else f" of joint {_listed(_several(self.joints))}"
         return f"harmonics {_listed(self._waves())}{of}"
 
+    @property
+    def option(self) -> str:
+        """As ``--effects`` has it."""
+        of = "" if self.joints == "all" else f"@{':'.join(map(str, _several(self.joints)))}"
+        return f"harmonics={':'.join(f'{k:g}' for k in self._waves())}{of}"
+
     def _waves(self) -> list[float]:
         given = [self.waves] if isinstance(self.waves, int | float) else [*self.waves]
         found = [number("waves", each, above=0.0) for each in given]

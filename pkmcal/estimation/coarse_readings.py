@@ -54,7 +54,7 @@ def coarse_readings(
     equations: Equations, named: Labels, fit: LinearFit, factors: FloatArray, covariance: Covariance
 ) -> tuple[Coarse, ...]:
     """Find them, for noise factors (G,); none of mixtures of readings and closures."""
-    if equations.closures.unknowns:
+    if equations.machines.unknowns:
         return ()
     variances = equations.whitening.variances(factors)
     component = component_of(equations)

@@ -61,7 +61,7 @@ class Estimator:
     @property
     def least_freedom(self) -> float:
         """Degrees of freedom from which the noise of a group is estimated."""
-        return LEAST_REDUNDANCY if self.equations.closures.unknowns else LEAST_FREEDOM
+        return LEAST_REDUNDANCY if self.equations.machines.unknowns else LEAST_FREEDOM
 
     def unknown_noise(self, estimate: Estimate) -> BoolArray:
         """Groups (G,) whose noise is neither stated nor can be estimated: too little is left.
@@ -101,7 +101,7 @@ class Estimator:
                 state, u = fewer, np.zeros(len(self.scale))
                 trail = replace(trail, near=self.start)
                 continue
-            if self.equations.closures.unknowns and state.first_freedom is None:
+            if self.equations.machines.unknowns and state.first_freedom is None:
                 state = replace(state, first_freedom=estimate.freedom)
                 estimate = replace(estimate, state=state)
             revised = self._revised(estimate)
@@ -334,7 +334,7 @@ class Estimator:
         factor = float(factors[0])
         if self.loss != "linear" or old.determined.rank != new.determined.rank:
             return None
-        alone = not (self._priors or self.equations.closures.unknowns)
+        alone = not (self._priors or self.equations.machines.unknowns)
         return factor if (factors == factor).all() and (factor == 1.0 or alone) else None
 
     def scaled_triangle(self, evaluation: Evaluation) -> FloatArray:
@@ -342,11 +342,11 @@ class Estimator:
 
         Where poses have unknowns it is that of what is left of all equations, whitened as stated.
         """
-        if self.equations.closures.unknowns:
+        if self.equations.machines.unknowns:
             return self.search.triangle(evaluation, np.ones(len(self.unstated)))
         arcs = [m.instrument.mm(m, self.start.robot.length) for m in self.equations.table.sets]
         factor = np.zeros((0, len(self.scale)))
-        for _, parts in self.equations.prediction.derivatives(evaluation, self.equations.closures):
+        for _, parts in self.equations.prediction.derivatives(evaluation):
             for i, rows, part in parts:
                 part *= arcs[i][:, None] * self.scale
                 factor = triangle(factor, self.equations.whitening.stacked(part, i, rows))

@@ -12,19 +12,17 @@ from dataclasses import replace
 import numpy as np
 
 from pkmcal.arguments import did_you_mean, shown
-from pkmcal.arrays import FloatArray, mm_per_unit
+from pkmcal.arrays import FloatArray
 from pkmcal.estimation.fit_data import PLACE, FitData, Numbers
 from pkmcal.estimation.parameters import FRAME, Asked, Bounds, Parameters
 from pkmcal.estimation.prior_functions import is_function, prior_functions
+from pkmcal.estimation.scales import unit_scales
 from pkmcal.estimation.sessions import Scope, label, matches, scopes
 from pkmcal.estimation.uncertain_numbers import spread, uncertain_names
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
-from pkmcal.geometry.load import is_of_load
+from pkmcal.geometry.elastic import is_kinematic
 from pkmcal.kinematics.calibratable import Calibratable
-from pkmcal.kinematics.robot import Robot
-from pkmcal.measurements.measurements import Measurements
 
-_WEIGHT = 100.0  # N, of a link of an arm, more or less
 _LEAST_PRIOR, _MOST_PRIOR = 1e-15, 1e15  # mm or rad, whose squares are numbers
 
 
@@ -73,13 +71,7 @@ def parameters(
     every = [geometry.units[i] for i in places]
     every += [unit for each in beside.values() for unit in each.units]
     units = tuple(str(every[j]) for j in number_of)
-    travel = max(_travel(robot, data.measured) for data in datasets)
-    of_unit = {"mm": 1.0, "rad": 1.0 / robot.length, "1": 1.0 / travel}
-    of_unit |= {"1/mm": 1.0 / travel**2, "1/rad": robot.length / travel**2}
-    of_unit["1/mm2"] = of_unit["1/mm"] / robot.length
-    pull = max(_pull(robot, data.measured) for data in datasets)
-    of_unit |= {"1/N": 1.0 / travel / pull, "N": pull / robot.length}
-    of_unit["rad/(N mm)"] = 1.0 / robot.length / (_WEIGHT * robot.length)
+    of_unit = unit_scales(robot, [data.measured for data in datasets])
     of_number = [np.full(len(places), np.nan)]  # where the unit says the scale
     of_number += [
         np.full(len(each.names), np.nan) if each.scale is None else each.scale
@@ -247,21 +239,6 @@ def _where_read(data: FitData, point: tuple[str, str]) -> tuple[str, ...]:
     return ()
 
 
-def _travel(robot: Calibratable, measured: Measurements) -> float:
-    """Largest actuator coordinate, mm; an angle counts as its arc."""
-    arcs = measured.actuators * mm_per_unit(robot.actuator_units, robot.length)
-    return max(1.0, float(np.abs(arcs).max()))
-
-
-def _pull(robot: Calibratable, measured: Measurements) -> float:
-    """Largest force that is known, N: of tensions, and of a load that they balance."""
-    load = robot.model.balanced_load if isinstance(robot, Robot) else None
-    forces = [1.0] if load is None else [1.0, *load.force]
-    if measured.tension is not None:
-        forces.append(float(np.nanmax(np.abs(measured.tension), initial=0.0)))
-    return float(np.abs(forces).max())
-
-
 def _matching(argument: str, pattern: object, names: Sequence[str], strict: bool) -> list[int]:
     if not isinstance(pattern, str):
         raise ArgumentTypeError(f"{argument}: names must be str, found {pattern!r}")
@@ -290,7 +267,7 @@ def _prior(
         return sigma
     if prior is not None:
         sigma[:of_machine] = _positive("prior", prior) * scale[:of_machine]
-        sigma[[is_of_load(name) for name in names]] = np.inf  # forces are no lengths
+        sigma[[not is_kinematic(name) for name in names]] = np.inf  # forces are no lengths
     return np.where(np.isfinite(of_effects), of_effects, sigma)
 
 

@@ -57,7 +57,7 @@ def poses_of_rows(equations: Equations) -> IntArray:
 
 def labels(equations: Equations) -> Labels:
     """Label the equations."""
-    return _of_mixtures(equations) if equations.closures.unknowns else _of_readings(equations)
+    return _of_mixtures(equations) if equations.machines.unknowns else _of_readings(equations)
 
 
 def _of_readings(equations: Equations) -> Labels:

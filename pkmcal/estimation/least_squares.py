@@ -99,7 +99,7 @@ class Search:
 
     def at(self, trail: Trail, u: FloatArray, noise: FloatArray) -> Trail:
         """Evaluate the equations at scaled parameters (n,), poses found with this noise (G,)."""
-        same = not self.equations.closures.unknowns or _same(noise, trail.noise)
+        same = not self.equations.machines.unknowns or _same(noise, trail.noise)
         if same and _same(u, trail.u):
             return trail
         there = self.equations.at(self._theta(u), noise, trail.near)

@@ -12,6 +12,8 @@ from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.parameters import Parameters
 from pkmcal.estimation.tensioned_poses import Cells, cells_of, check_cells
+from pkmcal.exceptions import ArgumentError
+from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.kinematics.drive_state import DriveState
 from pkmcal.measurements import repeats
 from pkmcal.measurements.measurements import Measurements
@@ -94,6 +96,7 @@ def pose_table(datasets: Sequence[FitData], parameters: Parameters) -> PoseTable
     double = [i for i, m in enumerate(sets) if m.other is not None]
     rows = np.concatenate([data.rows for data in datasets])
     sources = [*sets, *(sets[i] for i in double)]
+    _require_loads(robot, sets)
     cells = cells_of(robot, sources)
     known = _commands(sets, sources, cells)
     commands = np.hstack([*known.values()])
@@ -105,7 +108,8 @@ def pose_table(datasets: Sequence[FitData], parameters: Parameters) -> PoseTable
     key = np.column_stack([commands, machine]) if several else commands
     distinct, first, inverse = np.unique(key, axis=0, return_index=True, return_inverse=True)
     width = commands.shape[1]
-    parts = np.split(distinct[:, : width - 1], len(known), axis=1)
+    ends = np.cumsum([part.shape[1] for part in known.values()])
+    parts = np.split(distinct[:, : width - 1], ends[:-1], axis=1)
     of_pose = dict(zip(known, map(np.ascontiguousarray, parts), strict=True))
     tension, of_cells = of_pose.get("tension"), None
     if cells is not None:
@@ -129,7 +133,7 @@ def pose_table(datasets: Sequence[FitData], parameters: Parameters) -> PoseTable
         other_of=tuple(None if m.other is None else next(there) for m in sets),
         actuators=of_pose["actuators"],
         actuator_sigma=of_pose.get("sigma"),
-        state=DriveState(of_pose.get("approach"), tension),
+        state=DriveState(of_pose.get("approach"), tension, of_pose.get("load")),
         cells=of_cells,
         columns=columns,
         part_of=part_of,
@@ -175,6 +179,18 @@ def _times(key: IntArray, before: IntArray) -> IntArray:
     return times[len(before) :]
 
 
+def _require_loads(robot: Calibratable, sets: Sequence[Measurements]) -> None:
+    """Refuse sets with and without loads where those without would carry the stated payload."""
+    stated = [m.load is not None for m in sets]
+    payload = "payload.mass" in robot.geometry.names
+    if payload and any(stated) and not all(stated):
+        file = sets[stated.index(False)].file
+        raise ArgumentError(
+            f"measurements: {file or f'set {stated.index(False) + 1}'} states no load, others do,"
+            f" and the file of {robot.name} states a payload: state the load of all sets"
+        )
+
+
 def _machines(
     columns: IntArray, part_of: Sequence[IntArray]
 ) -> tuple[IntArray, tuple[IntArray, ...]]:
@@ -192,8 +208,8 @@ def _commands(
     noises = [m.actuator_sigma for m in sources if m.actuator_sigma is not None]
     states = [m.drive_state for m in sets]
     states += [m.other_drive_state for m in sets if m.other is not None]
-    approach, tension = (
-        _of_all(each, [m.actuators for m in sources]) for each in zip(*states, strict=True)
+    approach, tension, load = (
+        _of_all(each, [len(m) for m in sources]) for each in zip(*states, strict=True)
     )
     given = {
         "actuators": np.concatenate(
@@ -206,6 +222,7 @@ def _commands(
         "approach": approach,
         "tension": tension if cells is None else _blank(cells.read),
         "tension sigma": None if cells is None else cells.sigma,
+        "load": load,
     }
     return {name: part for name, part in given.items() if part is not None}
 
@@ -216,11 +233,10 @@ def _blank(tension: FloatArray) -> FloatArray:
     return np.where(there, tension, np.where(np.isnan(tension), np.inf, np.nan))
 
 
-def _of_all(
-    parts: Sequence[FloatArray | None], actuators: Sequence[FloatArray]
-) -> FloatArray | None:
+def _of_all(parts: Sequence[FloatArray | None], rows: Sequence[int]) -> FloatArray | None:
     """The rows of all sets; 0 where a set states nothing, None where none states anything."""
-    if all(part is None for part in parts):
+    widths = [part.shape[1] for part in parts if part is not None]
+    if not widths:
         return None
-    pairs = zip(parts, actuators, strict=True)
-    return np.concatenate([np.zeros(q.shape) if part is None else part for part, q in pairs])
+    pairs = zip(parts, rows, strict=True)
+    return np.concatenate([np.zeros((n, widths[0])) if part is None else part for part, n in pairs])

@@ -16,11 +16,10 @@ from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.parameters import Parameters
 from pkmcal.estimation.pose_table import PoseTable, pose_table
 from pkmcal.estimation.row_states import RowStates
-from pkmcal.estimation.session_machines import SessionClosures
 from pkmcal.estimation.sessions import NONE, by_parameters
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.calibratable import Calibratable
-from pkmcal.readings import joint_angles, orientation
+from pkmcal.readings import orientation
 from pkmcal.readings.reading import At, Predicted, joined
 
 _BATCH = 1024  # rows whose derivatives by the parameters are made at once, as many as caches hold
@@ -117,7 +116,7 @@ class Prediction:
         guess = np.tile(self.parameters.robot.home, (len(table.actuators), 1))
         for i, (measured, place) in enumerate(zip(table.sets, table.pose_of, strict=True)):
             elsewhere = self.datasets[i].framed or "tool" in self.columns[i]
-            if measured.kind in ("pose", "position") and not elsewhere:
+            if measured.instrument.is_place and not elsewhere:
                 known = np.isfinite(measured.values)
                 ever = np.flatnonzero(known.any(axis=0))  # not across a plane, say
                 read = np.flatnonzero(known[:, ever].all(axis=1))
@@ -140,8 +139,7 @@ class Prediction:
                 " no surplus actuators; found others"
             )
         for m in self.table.sets:
-            follows = m.joint and joint_angles.follows_pose(self.parameters.robot, m.joint)
-            if m.kind in ("between", "angle") and not follows:
+            if not m.instrument.follows_pose(self.parameters.robot):
                 raise ArgumentError(
                     f"measurements: readings of kind {m.kind!r} need poses that follow from the"
                     " actuators: no actuator_sigma, and no surplus actuators"
@@ -256,16 +254,14 @@ class Prediction:
             return known
         return self.at(evaluation.pose, evaluation.theta)
 
-    def derivatives(
-        self, evaluation: Evaluation, closures: SessionClosures
-    ) -> Iterator[tuple[slice, list[Part]]]:
+    def derivatives(self, evaluation: Evaluation) -> Iterator[tuple[slice, list[Part]]]:
         """Derivatives of the predicted values by the parameters, batch by batch.
 
         A batch is rows through all sets, and for each set that has some of these its rows and their
         derivative (b, k, n). There is one batch where poses have unknowns.
         """
         table, count, size = self.table, len(self.table.rows), len(self.parameters)
-        predicted = self.predicted(evaluation)
+        predicted, machines = self.predicted(evaluation), evaluation.machines
         direct = [
             m.instrument.by_geometry(
                 self._place(i, evaluation.pose, evaluation.theta), self.parameters.places
@@ -273,12 +269,12 @@ class Prediction:
             for i, m in enumerate(table.sets)
         ]
         place = np.full(len(evaluation.pose), NONE)
-        for batch in lots(count, count if closures.unknowns else _BATCH):
+        for batch in lots(count, count if machines.unknowns else _BATCH):
             some = list(self._in_sets(batch))
             numbers = table.columns.shape[1]
             parts = [np.zeros((*predicted[i].values[rows].shape, numbers)) for i, rows in some]
-            for poses, twists in closures.twists_by_numbers(
-                evaluation.machines, evaluation.states, self.parameters.places, self._poses_of(some)
+            for poses, twists in machines.twists_by_numbers(
+                evaluation.states, self.parameters.places, self._poses_of(some)
             ):
                 place[poses] = np.arange(len(poses))
                 for (i, rows), part in zip(some, parts, strict=True):
@@ -295,14 +291,14 @@ class Prediction:
                 found.append((i, rows, read.by_difference(wide, residual)))
             yield batch, found
 
-    def jacobian(self, evaluation: Evaluation, closures: SessionClosures) -> list[FloatArray]:
+    def jacobian(self, evaluation: Evaluation) -> list[FloatArray]:
         """Derivative of the predicted values of each set to the parameters, (N, k, n).
 
         With the opposite sign that of the residuals.
         """
         n = len(self.parameters)
         found = [np.empty((*each.shape, n)) for each in evaluation.residuals]
-        for _, parts in self.derivatives(evaluation, closures):
+        for _, parts in self.derivatives(evaluation):
             for i, rows, part in parts:
                 found[i][rows] = part
         return found

@@ -93,7 +93,7 @@ class Uncertainty:
     @property
     def mixed(self) -> bool:
         """Whether equations are mixtures of readings and closures; see `labels`."""
-        return bool(self.equations.closures.unknowns)
+        return bool(self.equations.machines.unknowns)
 
     @cached_property
     def matrix(self) -> FloatArray:
@@ -269,7 +269,7 @@ def uncertainty(
     rates = chosen.reported_rates(estimate.evaluation.theta) * chosen.scale
     if (
         rule == "auto"
-        and equations.closures.unknowns
+        and equations.machines.unknowns
         and fit.clusters < len(equations.blocks.components)
     ):
         rule = "cluster"  # no two mixtures can be compared to see whether they share an error
@@ -345,7 +345,7 @@ def unlike_components(
     """
     equations = estimator.equations
     several = any(len(m.components) > 1 for m in equations.table.sets)
-    if equations.closures.unknowns:
+    if equations.machines.unknowns:
         return None
     if estimator.loss != "linear" or not estimator.unstated.all() or not several:
         return None

@@ -23,6 +23,7 @@ from pkmcal.estimation.uncertainty import Uncertainty
 from pkmcal.fitted.distances import distances
 from pkmcal.fitted.dropped import outlying
 from pkmcal.fitted.nuisances import in_result, nuisances
+from pkmcal.kinematics.robot import Robot
 from pkmcal.statistics.distributions import t_factor
 from pkmcal.statistics.linear_fit import triangle
 from pkmcal.statistics.prior_test import LEAST_FREEDOM, PriorTest, data_alone, prior_test
@@ -87,7 +88,8 @@ def identifiability(estimator: Estimator, estimate: Estimate, hidden: int) -> di
     chosen = equations.parameters
     names: tuple[str, ...] = ()
     rest = measured.unidentifiable
-    if equations.closures.unknowns:
+    yields = isinstance(chosen.robot, Robot) and chosen.robot.model.elastic is not None
+    if equations.machines.unknowns or yields:
         names, rest = gauges(chosen, rest)
         if len(estimate.prior):  # a tape on two anchors ends the scale, say
             names, _ = gauges(chosen, estimate.state.determined.unidentifiable)
@@ -141,8 +143,8 @@ def misfit(
         "closure_rms": misfits.closure_rms(equations, estimate.evaluation),
         "closure_rms_before": misfits.closure_rms(equations, estimator.start),
         "closures": misfits.worst_closures(equations, estimate.evaluation),
-        "actuator_noise": float(shown[-1]) if equations.closures.unknowns else float("nan"),
-        "tension_noise": float(shown[-2]) if equations.closures.cells else float("nan"),
+        "actuator_noise": float(shown[-1]) if equations.machines.unknowns else float("nan"),
+        "tension_noise": float(shown[-2]) if equations.machines.cells else float("nan"),
         "tension_rms": misfits.cell_rms(equations, estimate.evaluation),
         "redundancy": tuple(estimate.freedom.tolist()),
         "idle": equations.blocks.uninformative,

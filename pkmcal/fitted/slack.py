@@ -118,7 +118,7 @@ def _without_each(
     """
     evaluation, noise = estimate.evaluation, estimate.state.noise
     before = squares_of_poses(equations, evaluation, noise)[poses]
-    shape = (len(poses), equations.closures.equations)
+    shape = (len(poses), equations.machines.equations)
     gain, longer = np.zeros(shape), np.zeros(shape)
     for k in range(shape[1]):
         cells = [(pose, k) for pose in poses.tolist()]
@@ -127,7 +127,7 @@ def _without_each(
         gain[:, k] = np.where(
             there.status[poses] == 0, before - squares_of_poses(other, there, noise)[poses], 0.0
         )
-        off, _ = other.closures.residual(there.machines, there.states)
+        off, _ = there.machines.residual(there.states)
         longer[:, k] = -off[poses, k]
     return gain, longer * np.sign(_slopes(equations, evaluation))[poses]
 
@@ -141,7 +141,7 @@ def taut(
     the way is taut after all.
     """
     cells: dict[tuple[int, int], Cell] = {}
-    if equations.closures.cells:
+    if equations.machines.cells:
         raise ArgumentError(
             "slack: cables are not looked at for slack where their tensions are unknown"
         )
@@ -186,7 +186,7 @@ def slack_cables(
     there = without.at(evaluation.theta, estimate.state.noise, evaluation)
     assert without.system is not None
     off = -without.system.readings_off(there) * _slopes(equations, there)
-    pose_of, actuator = np.concatenate(equations.table.pose_of), equations.closures.actuators
+    pose_of, actuator = np.concatenate(equations.table.pose_of), equations.machines.actuators
     cables = [
         SlackCable(
             tuple(equations.table.rows[pose_of == cell.pose].tolist()),
@@ -208,7 +208,7 @@ def _pulling(equations: Equations) -> BoolArray:
     """Which closures are of a cable, (equations,)."""
     robot = equations.parameters.robot
     if not isinstance(robot, Robot) or robot.model.chains is not None:
-        return np.zeros(equations.closures.equations, dtype=bool)
+        return np.zeros(equations.machines.equations, dtype=bool)
     home = robot.inverse(robot.home)[None]
     slope = robot.machine.slopes(robot.slots, home)[0]
     cables = np.array([KINDS[limb.kind].cable for limb in robot.model.limbs])
@@ -217,12 +217,12 @@ def _pulling(equations: Equations) -> BoolArray:
         bool(cables[mine].all()) and abs(np.sign(slope[mine]).sum()) == mine.sum()
         for mine in (of_limbs == a for a in range(robot.n_actuators))
     ]  # an actuator that lets one cable out and takes another in says nothing by its sign
-    return np.array([a >= 0 and pulling[a] for a in equations.closures.actuators], dtype=bool)
+    return np.array([a >= 0 and pulling[a] for a in equations.machines.actuators], dtype=bool)
 
 
 def _slopes(equations: Equations, evaluation: Evaluation) -> FloatArray:
     """By how much cables lengthen with what is read (K, equations), negative for reversed ones."""
-    actuators = equations.closures.actuators
+    actuators = equations.machines.actuators
 
     def slopes(robot: Calibratable, poses: IntArray) -> FloatArray:
         found = np.ones((len(poses), len(actuators)))

@@ -25,6 +25,9 @@ columns                               meaning
                                       ``.q1`` …, of what that actuator drives
 ``approach.q1`` …                     1 or -1: the reading had grown or fallen; 0: not known
 ``tension.q1`` …                      of what the actuator drives, N, or one ``tension`` for all
+``payload [kg]``                      what the platform carried; its centre in the frame of the tool
+                                      ``payload.x [mm]`` ``.y`` ``.z``, 0 without
+``force.x [N]``, ``moment.x [N mm]``  what pulled at the tool, with ``.y`` and ``.z``
 ``tension_sigma.q1`` …                standard deviation of what load cells read, N, or one for all
 ``target``                            name of the target that the row measured
 ``target.x [mm]`` ``.y`` ``.z``       its place on the platform (the fixed point of a distance)

@@ -18,6 +18,7 @@ from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.drive_state import DriveState
 from pkmcal.measurements.actuator_sigma import ActuatorSigma
 from pkmcal.measurements.approach import Approach
+from pkmcal.measurements.carried_load import CarriedLoad
 from pkmcal.measurements.field import declared, row_fields, units_of_actuators, values_array
 from pkmcal.measurements.former import OF_MEASUREMENTS, adapted
 from pkmcal.measurements.listing import table, title
@@ -109,6 +110,10 @@ class Measurements(Result):
         Standard deviation of `tension`, N: it is then a reading, and the true tensions of a row are
         unknown. None: it is exact, or, of a robot whose file says that tensions balance its load,
         estimated from the rows. Kept as (N, n).
+    load : Load, or (10,) or (N, 10) array, optional
+        What the platform carried, in place of the payload that the robot file states: one load for
+        all rows or one a row. Kept as (N, 10): mass in kg, centre in the frame of the tool in mm,
+        force at the tool in N and moment in N mm, in the axes of the base.
     temperature : scalar, (N,) or (N, 2 + n) array, optional
         °C, of the whole machine, or of base, platform and what each actuator drives; NaN: not read.
         `identify` refers numbers to 20 °C where it is told how the machine expands. Kept as
@@ -152,6 +157,7 @@ class Measurements(Result):
     approach: FloatArray | None = declared(Approach())
     tension: FloatArray | None = declared(Tension())
     tension_sigma: FloatArray | None = declared(TensionSigma())
+    load: FloatArray | None = declared(CarriedLoad())
     lines: Int64Array | None = declared(Lines())
 
     # The types above are those of the attributes; anything array-like is taken.
@@ -266,9 +272,9 @@ class Measurements(Result):
 
     @property
     def drive_state(self) -> DriveState:
-        """From where actuators came, and the tension of what they drive, as far as it was read."""
+        """From where actuators came, tensions as far as they were read, and what was carried."""
         tension = None if self.tension is None else filled_tension(self.tension)
-        return DriveState(self.approach, tension)
+        return DriveState(self.approach, tension, self.load)
 
     @property
     def other_drive_state(self) -> DriveState:
@@ -357,6 +363,35 @@ class Measurements(Result):
             The file cannot be written; one that was there before is untouched.
         """
         write_measurements(self, path, comment)
+
+    @staticmethod
+    def from_pandas(frame: Any, robot: Any = None, **options: Any) -> Measurements:
+        """Read a pandas data frame with the columns of a file; mm and rad where none is said.
+
+        Parameters
+        ----------
+        frame : pandas.DataFrame
+            Columns named as in files: ``q1``, ``z``, ``"z [um]"`` …; the index is left out.
+        robot : Robot, optional
+            The machine that was measured.
+        **options
+            Those of `read_measurements`: `rename`, `units`, `kind` …
+
+        Raises
+        ------
+        ValueError, TypeError
+            As `read_measurements`; line 1 is that of the headings.
+
+        Examples
+        --------
+        >>> frame = pandas.DataFrame({"q1": [450.0], "q2": [451.0], "z [um]": [120.0]})
+        ... # doctest: +SKIP
+        >>> Measurements.from_pandas(frame).values  # doctest: +SKIP
+        array([0.12])
+        """
+        from pkmcal.measurements.data_frame import measurements_of_frame
+
+        return measurements_of_frame(frame, robot, **options)
 
     def _columns(self) -> dict[str, Any]:
         """As the columns of a file, but for the units, which are mm and rad."""

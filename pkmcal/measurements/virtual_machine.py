@@ -14,6 +14,7 @@ from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray
 from pkmcal.display import first_rows
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
+from pkmcal.geometry.carried import Load
 from pkmcal.kinematics.calibratable import ArmMachine, Solvable
 from pkmcal.measurements.former import OF_MEASURE, adapted
 from pkmcal.measurements.measurements import Measurements
@@ -85,6 +86,7 @@ class VirtualMachine:
         *,
         approach: ArrayLike | None = None,
         tension: ArrayLike | None = None,
+        load: Load | None = None,
         **former: Any,
     ) -> Measurements:
         """Command actuators and measure where the machine goes.
@@ -103,6 +105,8 @@ class VirtualMachine:
             From where the actuators come; see `Measurements`.
         tension : scalar, (n,) or (N, n) array, optional
             Of what each actuator drives, N.
+        load : Load, optional
+            What the machine carries, one for all rows or one a row.
 
         Returns
         -------
@@ -138,6 +142,7 @@ class VirtualMachine:
             actuator_units=getattr(self._machine, "actuator_units", None),
             approach=approach,
             tension=tension,
+            load=load,
         )
         exact = blank.instrument.simulated(blank, _Solving(self._machine, blank))
         noise, sigma = self._drawn(blank, exact)

@@ -61,6 +61,10 @@ class Angle(Reading):
         values = found[:, None] - np.broadcast_to(zero, (len(m), 1))
         return Predicted(values, by_twist, {"zero": np.full((len(m), 1, 1), -1.0)})
 
+    def follows_pose(self, machine: Any) -> bool:
+        """Of a pulley's swivel it does; joints of a chain are where that closes."""
+        return joint_angles.follows_pose(machine, str(self.joint))
+
     def by_geometry(self, at: At, places: IntArray) -> FloatArray | None:
         """Derivative of the angle to numbers of the geometry at a held pose."""
         (m, machines), joint = at.of_rows(), str(self.joint)

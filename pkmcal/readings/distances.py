@@ -153,6 +153,10 @@ class Between(Reading):
     planned = False
     per_row = ("other", "approach")
 
+    def follows_pose(self, machine: Any) -> bool:
+        """It follows from two."""
+        return False
+
     def predict(self, at: At, target: FloatArray = ORIGIN, **numbers: FloatArray) -> Predicted:
         """Distance of the two places of `target` (N, 3) of the platform, mm."""
         assert at.other is not None

@@ -22,6 +22,7 @@ from pkmcal.exceptions import ArgumentError
 from pkmcal.files.csv_table import Table
 from pkmcal.files.csv_writer import WrittenColumn
 from pkmcal.readings import orientation, rows
+from pkmcal.readings.alignment import Laid, Sighting
 from pkmcal.readings.measured import InFit, Measured
 from pkmcal.readings.unknowns import Dependence, Found
 
@@ -156,6 +157,10 @@ class Reading:
         The first of three components that are an orientation and differ by a rotation vector.
     framed : bool
         Whether the readings are in the frame of an instrument.
+    frame_order : int
+        Of readings in one frame, whose place that frame where a search begins: the least number's.
+    is_place : bool
+        Whether its first components are x, y and z of the platform, or of a point of it.
     point : str
         Which body `Measurements.target` is a point of: the "platform", the "base", or "", neither.
     nouns : (str, str) or None
@@ -181,6 +186,8 @@ class Reading:
     components: ClassVar[Components] = ()
     turning: ClassVar[int | None] = None
     framed: ClassVar[bool] = False
+    frame_order: ClassVar[int] = 9
+    is_place: ClassVar[bool] = False
     point: ClassVar[Literal["platform", "base", ""]] = ""
     nouns: ClassVar[tuple[str, str] | None] = None
     by_firmware: ClassVar[bool] = False
@@ -215,6 +222,17 @@ class Reading:
 
     def starts(self, machine: Any, sets: Sets, found: Found) -> None:
         """Add to `found` where the search starts for unknowns that have no present value."""
+
+    def frame(self, seen: Sighting) -> Laid:
+        """Place the frame where its search begins: the base in it, and shifts of unknown targets.
+
+        By default where the base is, with its axes.
+        """
+        return np.zeros(6), {}
+
+    def follows_pose(self, machine: Any) -> bool:
+        """Whether it follows from one pose of the platform, wherever the actuators are."""
+        return True
 
     def arguments(self, m: Measured) -> dict[str, FloatArray]:
         """Give the arguments of `predict` for an instrument whose truth is stated."""

@@ -27,6 +27,7 @@ _TEXTS = (
 )  # fmt: skip
 _INSTRUMENT = ("name", "serial", "certificate", "expanded", "factor")
 _TEMPERATURE = ("mean", "uncertainty", "expansion", "expansion_uncertainty")
+_NOWHERE = np.empty(0)
 _ROUNDED = 0.1  # K, to which temperatures are stated
 
 
@@ -280,11 +281,36 @@ def _expansion(found: Identification, stated: Statement) -> str:
     return ""
 
 
+def _extent(positions: FloatArray) -> dict[str, list[float]]:
+    """From where to where the tool goes along each axis, mm."""
+    if not len(positions):
+        return {}
+    ends = zip(positions.min(axis=0).tolist(), positions.max(axis=0).tolist(), strict=True)
+    return {axis: list(pair) for axis, pair in zip("xyz", ends, strict=True)}
+
+
+def _over_measured(
+    found: Identification, stated: Statement, predicted: FloatArray
+) -> dict[str, Any] | None:
+    """U over the poses that were measured, where all of it is known, and where these are."""
+    if not predicted.size:
+        return None
+    made = budget(found, stated, predicted)
+    return {
+        "expanded_uncertainty": made.expanded,
+        "coverage": made.coverage,
+        "poses": len(predicted),
+        "extent": _extent(found.fit.end.pose[:, :3]),
+    }
+
+
 def as_data(
     found: Identification,
     stated: Statement,
     predicted: FloatArray,
     positions: FloatArray,
+    where: str = "",
+    measured: FloatArray = _NOWHERE,
     left_out: int = 0,
 ) -> dict[str, Any]:
     """The certificate as JSON files hold it.
@@ -295,6 +321,10 @@ def as_data(
         As `budget` takes them.
     positions : ndarray (N, 3)
         Of the tool at the poses of `predicted`, mm.
+    where : str
+        How these poses were drawn.
+    measured : ndarray (K,)
+        What is predicted at the poses that were measured, mm.
     left_out : int
         How many poses were drawn at which nothing is predicted.
     """
@@ -317,6 +347,9 @@ def as_data(
         "instrument_stated": bool(np.isfinite(stated.expanded)),
         "standard_uncertainty": made.combined,
         "expanded_uncertainty": made.expanded,
+        "region": where,
+        "extent": _extent(positions),
+        "measured": _over_measured(found, stated, measured),
         "coverage_factor": made.factor,
         "coverage": made.coverage,
         "dof": made.dof,

@@ -201,7 +201,7 @@ def iso9283(found: Identification) -> list[dict[str, Any]]:
     equations = found.fit.equations
     scores = []
     for i, measured in enumerate(equations.table.sets):
-        if measured.kind not in ("position", "pose"):
+        if not measured.instrument.is_place:
             continue
         read = np.isfinite(measured.values).all(axis=1)
         odd = np.isin(equations.table.rows[equations.table.set_of == i], found.outliers)
@@ -318,6 +318,13 @@ def over_the_workspace(found: Identification) -> tuple[WorkspaceAccuracy, Slice 
     accuracy[inside] = expected(found, grid.poses[inside])
     accuracy[~np.isfinite(accuracy)] = np.nan
     return sampled, Slice((axes[0], axes[1]), (grid.values[0], grid.values[1]), accuracy)
+
+
+def over_the_measured(found: Identification) -> FloatArray:
+    """Predict the accuracy at the poses that were measured, mm; those that are known."""
+    end = found.fit.end
+    predicted = expected(found, end.actuators if isinstance(found.robot, SerialArm) else end.pose)
+    return predicted[np.isfinite(predicted)]
 
 
 def _endless(robot: Robot) -> bool:

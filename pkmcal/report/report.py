@@ -85,11 +85,12 @@ def gather(
     accuracy = None if isinstance(predicted, str) else predicted[0]
     signed = None
     if stated is not None:
-        sure, where, unsure = np.empty(0), np.empty((0, 3)), 0
+        sure, places, region, unsure = np.empty(0), np.empty((0, 3)), "", 0
         if accuracy is not None:
-            sure, where = accuracy.predicted, accuracy.positions[np.isfinite(accuracy.accuracy)]
-            unsure = len(accuracy.accuracy) - len(sure)
-        signed = certificate.as_data(found, stated, sure, where, unsure)
+            sure, places = accuracy.predicted, accuracy.positions[np.isfinite(accuracy.accuracy)]
+            region, unsure = accuracy.where, len(accuracy.accuracy) - len(sure)
+        measured = contents.over_the_measured(found)
+        signed = certificate.as_data(found, stated, sure, places, region, measured, unsure)
     return {
         "state": state,
         "verdict": sentence,

@@ -16,6 +16,7 @@ from pkmcal.arms.joint_laws import JointLaws, Term
 from pkmcal.arms.weights import at_rest, gravity_torques
 from pkmcal.arrays import FloatArray
 from pkmcal.calibration.rigid import rigid_arm
+from pkmcal.diagnostics.waves import scan_waves
 from pkmcal.fitted.left_out import compared_by_poses
 from pkmcal.kinematics.calibratable import ArmMachine, as_machine
 
@@ -219,3 +220,37 @@ def test_which_products_there_are_does_not_depend_on_what_was_measured() -> None
 def test_what_cannot_be_is_refused(effect: object, machine: object, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         effect.of_machine(as_machine(machine))
+
+
+def test_waves_of_harmonic_drives_are_named_by_joint() -> None:
+    """Twice the ratio, of amplitudes that were found on a real arm, once sag is modelled."""
+    waves, sizes = (240.0, 242.0, 200.0), np.array([60.0, 60.0, 90.0]) * 1e-6
+    true = built(1).with_terms([Term(i, "cos", k) for i, k in enumerate(waves)])
+    true = true.with_laws(true.laws.with_values(sizes))
+    m = measured(commands(250, 1), true, 2, SOFT, shared=0.02)
+    found = pk.identify(ARM, m, effects=[pk.Sag("all")], unknown="frame")
+    named = scan_waves(found)
+    assert [(wave.joint, wave.waves) for wave in named] == [(1, 240), (2, 242), (3, 200)]
+    np.testing.assert_allclose([wave.size for wave in named], sizes, rtol=0.5)
+    assert any("--effects harmonics=200@3" in text for text in found.verdict.remarks)
+
+
+def test_no_waves_are_named_where_there_are_none() -> None:
+    m = measured(commands(120, 2), built(2), 3, SOFT, shared=0.03)
+    assert not scan_waves(pk.identify(ARM, m, effects=[pk.Sag("all")], unknown="frame"))
+
+
+def test_waves_that_a_regular_grid_cannot_tell_apart_are_said() -> None:
+    """At steps of 10 deg 200 waves look like 20."""
+    theta = commands(150, 4)
+    theta[:, 2] = np.radians(10.0) * np.round(theta[:, 2] / np.radians(10.0))
+    true = built(3).with_terms([Term(2, "cos", 200.0)])
+    true = true.with_laws(true.laws.with_values(np.array([3e-4])))
+    m = measured(theta, true, 5, SOFT)
+    found = pk.identify(ARM, m, effects=[pk.Sag("all")], unknown="frame")
+    (wave,) = scan_waves(found)
+    assert wave.joint == 3
+    alike = [(wave.waves + sign * 200 + 18) % 36 - 18 for sign in (-1, 1)]
+    assert min(map(abs, alike)) <= 3  # which the joint's range does not tell apart
+    assert wave.steps == pytest.approx(np.radians(10.0))
+    assert any("look alike" in text for text in found.verdict.remarks)
