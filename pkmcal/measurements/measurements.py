@@ -32,6 +32,7 @@ from pkmcal.measurements.temperature import Temperature
 from pkmcal.measurements.tension import Tension, TensionSigma, filled_tension
 from pkmcal.measurements.time_stamps import Time
 from pkmcal.measurements.tracker import Tracker
+from pkmcal.readings.constants import columns_of_constants
 from pkmcal.readings.reading import Reading
 from pkmcal.readings.registry import Kind, as_reading
 from pkmcal.readings.rows import numbers
@@ -399,7 +400,11 @@ class Measurements(Result):
         values = self.values.reshape(len(self), -1)
         columns |= dict(zip(self.components, values.T, strict=True))
         units = self.actuator_units or ("",) * self.actuators.shape[1]
-        columns |= {each.name: each.values for each in self.instrument.columns(units)}
+        of_instrument = (
+            *self.instrument.columns(units),
+            *columns_of_constants(self.instrument, len(self)),
+        )
+        columns |= {each.name: each.values for each in of_instrument}
         fields = (column for each in row_fields(type(self)) for column in each.framed(self))
         return columns | {column.name: column.values for column in fields}
 
