@@ -36,6 +36,7 @@ from pkmcal.diagnostics.sag import sag_that_helps
 from pkmcal.effects.effect import Effects
 from pkmcal.estimation.datasets import as_fit_data, by_set
 from pkmcal.estimation.free_parameters import parameters
+from pkmcal.estimation.held_coefficients import coefficients, of_the_machine, with_held
 from pkmcal.estimation.parameters import Asked, Bounds, Prior
 from pkmcal.exceptions import ArgumentError, CalibrationWarning
 from pkmcal.fitted.dropped import Drop, left_out
@@ -118,8 +119,8 @@ def identify(
         number; of a session that is held out such numbers are found from its rows, before these
         are compared with the fit.
     fix : str or sequence of str
-        Numbers of the geometry, by name or wildcard, that keep their present values though `free`
-        or the robot's default set has them.
+        Numbers of the geometry and coefficients of effects, by name or wildcard, that keep their
+        present values though `free`, the robot's default set or the effect has them.
 
         The word "datum" holds as many numbers as the measurements leave open of where the base
         frame and the platform frame lie, and of how the frames between an arm's joints are drawn:
@@ -182,9 +183,14 @@ def identify(
     roles, own = unknown_roles(unknown), words("per_session", per_session)
     fixed, find_datum = fixed_names(fix)
     machine, moving, of_effects = effects_on(machine, effects)
-    asked = Asked(free, prior, bounds, own, by_set(roles), fixed, of_effects=of_effects)
     weighed, rule = loss_and_rule(loss)
     given = as_fit_data(machine, measurements, roles, bool(own), moving)
+    of_machine = partial(
+        of_the_machine, coefficients=coefficients(given), names=machine.geometry.names
+    )
+    given = with_held(given, fixed)
+    free = None if free is None else of_machine(words("free", free))
+    asked = Asked(free, prior, bounds, own, by_set(roles), of_machine(fixed), of_effects=of_effects)
     named, drop_outliers, drop_slack = left_out(drop, sum(len(data.rows) for data in given))
     rows = prepare(machine, given, holdout, named, bool(own))
     chosen = parameters(machine, rows.fitted, asked)

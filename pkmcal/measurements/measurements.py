@@ -52,8 +52,8 @@ class Measurements(Result):
         `identify` is given ``unknown="frame"``); see `kind`. NaN: not read there.
         One row is taken as it is: actuators (n,) with values (6,), (3,) or a number, and what else
         has one entry a row likewise.
-    kind : str or Reading
-        What was read: a word, or an object of `pkmcal.readings` with what its rows have of their
+    kind : str or Reading, optional
+        What was read, by default that of `instrument`, or a position: a word, or an object of `pkmcal.readings` with what its rows have of their
         own. "pose": x y z alpha beta gamma of the platform, (N, 6). "position": x y z of the
         target, (N, 3). "height": z of the target, (N,). "distance", `Distance(attachment)`: from
         the target, which here is a fixed point of the base frame, to a point of the platform, (N,).
@@ -83,7 +83,8 @@ class Measurements(Result):
     actuator_units : str or sequence of str, optional
         "mm" or "rad", one for all or one per actuator. None: not stated; written as mm.
     instrument : Reading, optional
-        As `kind` has it; `dataclasses.replace` hands it on.
+        As `kind` has it; `dataclasses.replace` hands it on. An object as `kind` is taken in its
+        place, a word has to be its kind.
     file : str
         The name of that file.
     notes : sequence of str
@@ -166,7 +167,7 @@ class Measurements(Result):
         self,
         actuators: ArrayLike,
         values: ArrayLike | None,
-        kind: Kind | Reading | str = "position",
+        kind: Kind | Reading | str | None = None,
         *,
         sigma: ArrayLike | Tracker | None = None,
         target: ArrayLike | None = None,
@@ -181,9 +182,10 @@ class Measurements(Result):
         of_rows = row_fields(type(self))
         stated = {each.name: fields.pop(each.name, None) for each in of_rows}
         stated |= {"sigma": sigma, "target_index": target_index}
-        if instrument is None or (isinstance(kind, str) and kind != instrument.name):
-            instrument = as_reading(kind)  # type: ignore[arg-type]
-        instrument = adapted("Measurements", instrument, fields, OF_MEASUREMENTS)
+        present = (*stated, *_ARGUMENTS)
+        instrument = adapted(
+            "Measurements", _stated(kind, instrument), fields, OF_MEASUREMENTS, present
+        )
         q = numbers("actuators", actuators)
         if q.ndim not in (1, 2) or 0 in q.shape:
             raise ArgumentError(
@@ -411,3 +413,21 @@ class Measurements(Result):
     def _parts(self) -> Iterator[str | Table]:
         yield title(self)
         yield table(self)
+
+
+_ARGUMENTS = ("kind", "target", "target_names", "actuator_units", "instrument", "file", "notes")
+
+
+def _stated(kind: Kind | Reading | str | None, instrument: Reading | None) -> Reading:
+    """The instrument that `kind` and `instrument` state."""
+    own = None if instrument is None else as_reading(instrument, "instrument")
+    if kind is None:
+        return as_reading("position") if own is None else own
+    if own is None or not isinstance(kind, str):
+        return as_reading(kind)  # type: ignore[arg-type]
+    if kind != own.name:
+        raise ArgumentError(
+            f"kind: {kind!r} contradicts the instrument, {type(own).__name__}; an object, such as"
+            " kind=pkmcal.readings.Pose(), takes the place of both"
+        )
+    return own

@@ -26,8 +26,7 @@ def names_of_constants(reading: Reading) -> tuple[str, ...]:
     """Fields that no other column of its kind holds, and that are no truth of a simulation."""
     of = (reading.per_row, reading.labels, reading.own_points, reading.truth, reading.stated)
     others = {name for names in of for name in names}
-    fields = dataclasses.fields(reading) if dataclasses.is_dataclass(reading) else ()
-    return tuple(each.name for each in fields if each.name not in others)
+    return tuple(each.name for each in _fields(reading) if each.name not in others)
 
 
 def columns_of_constants(reading: Reading, rows: int) -> Iterator[WrittenColumn]:
@@ -94,8 +93,12 @@ def _heading(reading: Reading, name: str) -> str:
     return f"{reading.name}.{name}"
 
 
+def _fields(reading: Reading) -> tuple[dataclasses.Field[Any], ...]:
+    return dataclasses.fields(reading) if dataclasses.is_dataclass(reading) else ()
+
+
 def _default(reading: Reading, name: str) -> Any:
-    (field,) = (each for each in dataclasses.fields(reading) if each.name == name)  # type: ignore[arg-type]
+    (field,) = (each for each in _fields(reading) if each.name == name)
     if field.default_factory is not dataclasses.MISSING:
         return field.default_factory()
     return field.default

@@ -187,3 +187,86 @@ def test_an_effect_that_gives_no_number_is_refused(
     robot, true, q = machine
     with pytest.raises(pk.ArgumentError, match=r"position: nothing finite .* row 0"):
         pk.identify(robot, measured(true, q, 1), free="offset*", effects=[Lost()])
+
+
+def test_a_coefficient_that_is_held_by_name_stays_where_it_starts(
+    machine: tuple[pk.Robot, pk.Robot, FloatArray],
+) -> None:
+    """As if the effect stated it: the same numbers of the machine, and no parameter."""
+
+    class Stated(Sinking):
+        def dependences(self, measured: pk.Measurements) -> Iterator[Dependence]:
+            n = len(measured)
+            yield Dependence(
+                self.argument, "sink", np.full((n, 1), RATE), {}, np.zeros(n, dtype=np.intp)
+            )
+
+    class Begun(Sinking):
+        def dependences(self, measured: pk.Measurements) -> Iterator[Dependence]:
+            (each,) = super().dependences(measured)
+            one = replace(each.estimated[""], start=np.array([RATE]))
+            yield replace(each, estimated={"": one})
+
+    robot, true, q = machine
+    rows = measured(true, q, 0)
+    stated = pk.identify(robot, rows, free="offset*", effects=[Stated()], holdout=0.25)
+    for pattern in ("sink.rate", "sink*"):
+        held = pk.identify(
+            robot, rows, free="offset*", effects=[Begun()], fix=[pattern, "offset3"], holdout=0.25
+        )
+        assert held.free == tuple(f"offset{i}" for i in (1, 2, 4, 5, 6))
+    held = pk.identify(robot, rows, free="offset*", effects=[Begun()], fix="sink*", holdout=0.25)
+    np.testing.assert_allclose(held.values, stated.values, atol=1e-9)
+    np.testing.assert_allclose(held.stderr, stated.stderr, rtol=1e-9)
+    assert held.holdout_rms == pytest.approx(stated.holdout_rms, rel=1e-9)
+    freed = pk.identify(robot, rows, free=["offset*", "sink.rate"], effects=[Sinking()])
+    assert freed.free[-1] == "sink.rate"
+    with pytest.raises(pk.ArgumentError, match=r"fix: .*'sink.rte'"):
+        pk.identify(robot, rows, free="offset*", effects=[Sinking()], fix="sink.rte")
+
+
+def test_two_numbers_of_one_name_are_refused(
+    machine: tuple[pk.Robot, pk.Robot, FloatArray],
+) -> None:
+    class Named(Sinking):
+        def dependences(self, measured: pk.Measurements) -> Iterator[Dependence]:
+            (each,) = super().dependences(measured)
+            yield replace(each, estimated={"": replace(each.estimated[""], names=("offset2",))})
+
+    robot, true, q = machine
+    with pytest.raises(pk.ArgumentError, match="^offset2: 2 different parameters have this name"):
+        pk.identify(robot, measured(true, q, 0), free="offset*", effects=[Named()])
+
+
+def test_what_is_no_effect_is_named(machine: tuple[pk.Robot, pk.Robot, FloatArray]) -> None:
+    class Half:
+        name = "half"
+
+        def of_rows(self, measured: Any) -> Any:
+            return self
+
+    robot, true, q = machine
+    rows = measured(true, q, 0)
+    for wrong, message in (
+        (Sinking, r"the class Sinking; an object of it is needed: Sinking\(…\)"),
+        ([Sinking], "the class Sinking"),
+        (Half(), "an object of class Half has no dependences"),
+        (7, "expected such as"),
+        ([7], "expected such as"),
+    ):
+        with pytest.raises(pk.ArgumentTypeError, match=f"^effects: .*{message}"):
+            pk.identify(robot, rows, free="offset*", effects=wrong)  # type: ignore[arg-type]
+
+
+def test_one_effect_stands_beside_the_former_expansion(
+    machine: tuple[pk.Robot, pk.Robot, FloatArray],
+) -> None:
+    robot, true, q = machine
+    warm = replace(measured(true, q, 0), temperature=np.full(len(q), 20.0))
+    with pytest.warns(DeprecationWarning, match="expansion= will go"):
+        found = pk.identify(  # type: ignore[call-arg]
+            robot, warm, free="offset*", effects=Sinking(), expansion=11.5e-6
+        )
+    assert found.free[-1] == "sink.rate" and found.expansion
+    with pytest.raises(pk.ArgumentError, match="expansion: not beside effects='auto'"):
+        pk.identify(robot, warm, effects="auto", expansion=11.5e-6)  # type: ignore[call-arg]

@@ -12,9 +12,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pkmcal.exceptions import ArgumentError
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.virtual_machine import VirtualMachine
-from pkmcal.readings import Distance
+from pkmcal.readings import Distance, Height
 
 from .kinds import PUBLIC, needed, width
 
@@ -407,3 +408,18 @@ def test_sessions_stay_with_their_rows() -> None:
 def test_what_is_no_session_is_refused(given: Any, message: str) -> None:
     with pytest.raises((ValueError, TypeError), match=message):
         make(session=given)
+
+
+def test_kind_and_instrument_never_contradict_each_other_silently() -> None:
+    q, values, fixed = np.full((2, 6), 400.0), [1.0, 2.0], [0, 0, 100.0]
+    m = Measurements(q, values, target=fixed, instrument=Distance([1, 2, 3]))
+    assert m.kind == "distance" and m.attachments[0].tolist() == [1, 2, 3]
+    other = dataclasses.replace(m, kind=Distance([4, 5, 6]))
+    assert other.attachments[0].tolist() == [4, 5, 6]
+    assert dataclasses.replace(m, instrument=Distance([4, 5, 6])).attachments[0, 0] == 4
+    for wrong in ({"kind": "height"}, {"instrument": Height()}):
+        with pytest.raises(ArgumentError, match="kind: .* contradicts the instrument"):
+            dataclasses.replace(m, **wrong)
+    for classes in ({"kind": Height}, {"instrument": Height}, {"instrument": 3}):
+        with pytest.raises(TypeError, match="must be a word or a Reading, found"):
+            Measurements(q, values, **classes)  # type: ignore[arg-type]
