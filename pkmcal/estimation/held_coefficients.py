@@ -70,12 +70,12 @@ def coefficients(datasets: Sequence[FitData]) -> tuple[str, ...]:
     )
 
 
-def with_held(datasets: Sequence[FitData], patterns: tuple[str, ...]) -> tuple[FitData, ...]:
+def with_held(datasets: Sequence[FitData], patterns: tuple[str, ...]) -> list[FitData]:
     """The rows with effects of which the coefficients of these names are held."""
-    return tuple(
+    return [
         replace(data, effects=tuple(_held(effect, data, patterns) for effect in data.effects))
         for data in datasets
-    )
+    ]
 
 
 def of_the_machine(

@@ -34,7 +34,7 @@ from pkmcal.measurements.time_stamps import Time
 from pkmcal.measurements.tracker import Tracker
 from pkmcal.readings.constants import columns_of_constants
 from pkmcal.readings.reading import Reading
-from pkmcal.readings.registry import Kind, as_reading
+from pkmcal.readings.registry import Kind, as_reading, stated
 from pkmcal.readings.rows import numbers
 from pkmcal.result import Result
 
@@ -53,8 +53,9 @@ class Measurements(Result):
         One row is taken as it is: actuators (n,) with values (6,), (3,) or a number, and what else
         has one entry a row likewise.
     kind : str or Reading, optional
-        What was read, by default that of `instrument`, or a position: a word, or an object of `pkmcal.readings` with what its rows have of their
-        own. "pose": x y z alpha beta gamma of the platform, (N, 6). "position": x y z of the
+        What was read, by default as `instrument` has it, or a position: a word, or an object of
+        `pkmcal.readings` with what its rows have of their own.
+        "pose": x y z alpha beta gamma of the platform, (N, 6). "position": x y z of the
         target, (N, 3). "height": z of the target, (N,). "distance", `Distance(attachment)`: from
         the target, which here is a fixed point of the base frame, to a point of the platform, (N,).
         "closure": nothing, `values` is None; what the actuators read is all that is known.
@@ -180,11 +181,11 @@ class Measurements(Result):
         **fields: Any,
     ) -> None:
         of_rows = row_fields(type(self))
-        stated = {each.name: fields.pop(each.name, None) for each in of_rows}
-        stated |= {"sigma": sigma, "target_index": target_index}
-        present = (*stated, *_ARGUMENTS)
+        rowwise = {each.name: fields.pop(each.name, None) for each in of_rows}
+        rowwise |= {"sigma": sigma, "target_index": target_index}
+        present = (*rowwise, *_ARGUMENTS)
         instrument = adapted(
-            "Measurements", _stated(kind, instrument), fields, OF_MEASUREMENTS, present
+            "Measurements", stated(kind, instrument), fields, OF_MEASUREMENTS, present
         )
         q = numbers("actuators", actuators)
         if q.ndim not in (1, 2) or 0 in q.shape:
@@ -205,7 +206,7 @@ class Measurements(Result):
             "notes": words("notes", notes),
         })  # fmt: skip
         for each in of_rows:
-            given = stated[each.name]
+            given = rowwise[each.name]
             self.__setstate__({each.name: None if given is None else each.kept(given, self)})
         self.__setstate__({"target": checked_target(place, self)})
         self.__setstate__({"target_names": names_of_targets(target_names, self)})
@@ -416,18 +417,3 @@ class Measurements(Result):
 
 
 _ARGUMENTS = ("kind", "target", "target_names", "actuator_units", "instrument", "file", "notes")
-
-
-def _stated(kind: Kind | Reading | str | None, instrument: Reading | None) -> Reading:
-    """The instrument that `kind` and `instrument` state."""
-    own = None if instrument is None else as_reading(instrument, "instrument")
-    if kind is None:
-        return as_reading("position") if own is None else own
-    if own is None or not isinstance(kind, str):
-        return as_reading(kind)  # type: ignore[arg-type]
-    if kind != own.name:
-        raise ArgumentError(
-            f"kind: {kind!r} contradicts the instrument, {type(own).__name__}; an object, such as"
-            " kind=pkmcal.readings.Pose(), takes the place of both"
-        )
-    return own

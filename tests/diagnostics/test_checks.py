@@ -171,5 +171,5 @@ def test_a_check_alone_and_what_is_none_are_refused() -> None:
 
 def test_a_remedy_without_a_value_is_not_applied() -> None:
     for before in ({}, {"fix": "offset1"}):
-        with pytest.raises(pk.ArgumentError, match="^fix: the remedy states no value"):
+        with pytest.raises(pk.ArgumentError, match=r"^fix: the remedy states no value"):
             pk.Remedy("fix").applied(before)

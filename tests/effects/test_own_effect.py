@@ -234,7 +234,7 @@ def test_two_numbers_of_one_name_are_refused(
             yield replace(each, estimated={"": replace(each.estimated[""], names=("offset2",))})
 
     robot, true, q = machine
-    with pytest.raises(pk.ArgumentError, match="^offset2: 2 different parameters have this name"):
+    with pytest.raises(pk.ArgumentError, match=r"^offset2: 2 different parameters have this name"):
         pk.identify(robot, measured(true, q, 0), free="offset*", effects=[Named()])
 
 
@@ -270,3 +270,57 @@ def test_one_effect_stands_beside_the_former_expansion(
     assert found.free[-1] == "sink.rate" and found.expansion
     with pytest.raises(pk.ArgumentError, match="expansion: not beside effects='auto'"):
         pk.identify(robot, warm, effects="auto", expansion=11.5e-6)  # type: ignore[call-arg]
+
+
+def test_what_moves_in_another_shape_is_named(
+    machine: tuple[pk.Robot, pk.Robot, FloatArray],
+) -> None:
+    robot, true, q = machine
+    rows = measured(true, q, 0)
+    n = len(q)
+    wrong: tuple[tuple[Any, str], ...] = (
+        (Moved(np.zeros((n, 3))), rf"moved of Bad: twist .* shape \({n}, 6\); found \({n}, 3\)"),
+        (Moved(np.zeros((n, 6))), "'sink' is estimated, .* gives no derivative by it"),
+        (Moved(np.zeros((n, 6)), {"sink": np.zeros((n, 6))}), r"by\['sink'\] must be an array"),
+        (Moved(np.zeros((n, 6)), {"sink": np.zeros((n, 6, 2))}), r"by\['sink'\] must be an array"),
+        (np.zeros((n, 6)), r"must return Moved\(…\); found ndarray"),
+    )
+    for returned, message in wrong:
+
+        class Bad(Sinking):
+            def of_rows(self, measured: Any) -> Any:
+                return self
+
+            def moved(self, *given: Any, found: Any = returned) -> Any:
+                return found
+
+        with pytest.raises(pk.Error, match=message):
+            pk.identify(robot, rows, free="offset*", effects=[Bad()])
+
+
+def test_a_coefficient_that_the_readings_do_not_see_is_no_calibration(
+    machine: tuple[pk.Robot, pk.Robot, FloatArray],
+) -> None:
+    """A sensor of tilts sees how the platform tips, and not how it sinks."""
+
+    class Straight(Sinking):
+        def moved(self, *given: Any) -> Moved:
+            found = super().moved(*given)
+            for each in (found.twist, found.by[self.argument]):
+                each[:, :3] = 0.0
+            return found
+
+    robot, _, q = machine
+    tilts = pk.VirtualMachine(robot, 0.0, 1, angle_noise=1e-5).measure(q, "tilt")
+    seen = pk.identify(robot, tilts, free=["base1.z", "base2.z"], effects=[Sinking()])
+    assert np.isfinite(seen.stderr[seen.free.index("sink.rate")])
+    assert "undetermined-effect" not in [each.check for each in seen.verdict.said]
+    blind = pk.identify(robot, tilts, free=["base1.z", "base2.z"], effects=[Straight()])
+    assert np.isinf(blind.stderr[blind.free.index("sink.rate")])
+    (said,) = [each for each in blind.verdict.said if each.check == "undetermined-effect"]
+    assert "sink.rate is not determined" in said.text and blind.verdict.state == "doubtful"
+    again = pk.identify(
+        robot, tilts, ["base1.z", "base2.z"], **said.remedies[0].applied({"effects": [Straight()]})
+    )
+    assert again.free[:2] == ("base1.z", "base2.z") and "sink.rate" not in again.free
+    assert again.verdict.state == "calibrated"

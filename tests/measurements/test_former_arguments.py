@@ -106,7 +106,7 @@ def test_what_another_kind_has_is_refused_by_name(name: str) -> None:
 def test_arguments_that_never_were_are_refused_by_name() -> None:
     with pytest.raises(TypeError, match="'tempratures'; did you mean 'temperature'"):
         pk.Measurements(Q, [1.0, 2.0], "height", tempratures=20.0)
-    with pytest.raises(TypeError, match="unexpected argument 'runs'$"):  # not a former one
+    with pytest.raises(TypeError, match=r"unexpected argument 'runs'$"):  # not a former one
         pk.Measurements(Q, [1.0, 2.0], "height", runs=NAMES)
     with pytest.raises(TypeError, match=r"measure.*unexpected argument 'group'"):
         pk.VirtualMachine(pk.load("hexapod")).measure(np.full(6, 880.0), group=[1])

@@ -418,7 +418,7 @@ def test_kind_and_instrument_never_contradict_each_other_silently() -> None:
     assert other.attachments[0].tolist() == [4, 5, 6]
     assert dataclasses.replace(m, instrument=Distance([4, 5, 6])).attachments[0, 0] == 4
     for wrong in ({"kind": "height"}, {"instrument": Height()}):
-        with pytest.raises(ArgumentError, match="kind: .* contradicts the instrument"):
+        with pytest.raises(ArgumentError, match=r"kind: .* contradicts the instrument"):
             dataclasses.replace(m, **wrong)
     for classes in ({"kind": Height}, {"instrument": Height}, {"instrument": 3}):
         with pytest.raises(TypeError, match="must be a word or a Reading, found"):
