@@ -48,6 +48,8 @@ class Field:
         super().__init_subclass__()
         if cls.columns is not Field.columns and cls.read is Field.read:
             raise TypeError(f"{cls.__name__}: has columns of its own, and no method read for them")
+        if cls.kept is Field.kept:
+            raise TypeError(f"{cls.__name__}: has no method kept, which checks what is given")
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name

@@ -72,6 +72,9 @@ def test_a_field_that_writes_columns_of_its_own_has_to_read_them() -> None:
             def columns(self, m: Any, units: Any) -> Any:
                 yield WrittenColumn("lost", "", np.zeros(2))
 
+    with pytest.raises(TypeError, match="Raw: has no method kept"):
+        type("Raw", (Field,), {})
+
 
 @dataclass(frozen=True, eq=False)
 class Camera(Spot):

@@ -17,28 +17,22 @@ from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.virtual_machine import VirtualMachine
 from pkmcal.readings import Distance, Height
 
-from .kinds import PUBLIC, needed, width
-
-SHAPES = {
-    "pose": (5, 6), "position": (5, 3), "height": (5,), "distance": (5,), "closure": (5, 0),
-    "between": (5,), "relative-distance": (5,), "orientation": (5, 3), "tilt": (5, 2),
-    "angle": (5,), "touch": (5, 3),
-}  # fmt: skip
+from .kinds import PUBLIC, needed, shape, width
 
 
 def make(kind: str = "position", **fields: Any) -> Measurements:
     random = np.random.default_rng(0)
     fields = needed(kind, 5, 4) | fields
     q = random.uniform(300, 500, (5, 4))
-    return Measurements(q, random.normal(size=SHAPES[kind]), kind, **fields)
+    return Measurements(q, random.normal(size=shape(kind, 5)), kind, **fields)
 
 
 @pytest.mark.parametrize("kind", PUBLIC)
 def test_every_kind_has_its_shape_components_and_units(kind: str) -> None:
     m = make(kind)
     assert len(m) == 5
-    assert m.values.shape == SHAPES[kind]
-    assert len(m.components) == len(m.units) == (SHAPES[kind] + (1,))[1]
+    assert m.values.shape == shape(kind, 5)
+    assert len(m.components) == len(m.units) == width(kind)
 
 
 def test_arrays_are_copies_that_cannot_be_changed() -> None:
