@@ -38,8 +38,10 @@ from pkmcal.estimation.datasets import as_fit_data, by_set
 from pkmcal.estimation.free_parameters import parameters
 from pkmcal.estimation.held_coefficients import coefficients, of_the_machine, with_held
 from pkmcal.estimation.parameters import Asked, Bounds, Prior
+from pkmcal.estimation.uncertain_numbers import uncertain_sets
 from pkmcal.exceptions import ArgumentError, CalibrationWarning
 from pkmcal.fitted.dropped import Drop, left_out
+from pkmcal.geometry.stated_uncertainty import Uncertain, stated_uncertainty
 from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
@@ -62,6 +64,7 @@ def identify(
     fix: str | Sequence[str] = (),
     drop: Drop = None,
     effects: Effects | Literal["auto"] = (),
+    uncertainty: Uncertain = None,
 ) -> Identification[Given]:
     """Find the geometry that agrees best with measurements.
 
@@ -139,6 +142,17 @@ def identify(
         What moves the machine off the pose that its geometry gives: ``[pk.Expansion(11.5e-6)]``,
         by loads of the rows ``[pk.Elasticity("offset*")]``,
         of an arm ``[pk.Sag()]``. "auto": sag of an arm, if it helps at poses left out.
+    uncertainty : mapping of str to float, optional
+        How wrong numbers may be that are neither free nor held by `fix`: standard deviations by
+        name or wildcard, mm, rad or 1, later entries before earlier ones, 0 of what is exact. They
+        stand behind those of the robot file. Such numbers are fitted along, with this as a prior
+        about their present values, and are in the result only if they moved by more than twice
+        that: `Identification.nuisances`. ``target*``, ``frame*`` and the like mean what readings
+        depend on, ``scale`` the scale of the instrument (20e-6).
+
+        Under "common" are deviations of one amount by which all numbers are wrong alike, of points
+        each coordinate: ``{"common": {"target*": 0.3}}``. Under "consider" are those of numbers of
+        the geometry that are to stay exactly where they are: nothing but ± allows for them.
 
     Returns
     -------
@@ -182,15 +196,19 @@ def identify(
     machine = as_machine(robot)
     roles, own = unknown_roles(unknown), words("per_session", per_session)
     fixed, find_datum = fixed_names(fix)
+    stated = machine.model.uncertainty.with_later(stated_uncertainty(uncertainty))
     machine, moving, of_effects = effects_on(machine, effects)
     weighed, rule = loss_and_rule(loss)
     given = as_fit_data(machine, measurements, roles, bool(own), moving)
     of_machine = partial(
         of_the_machine, coefficients=coefficients(given), names=machine.geometry.names
     )
-    given = with_held(given, fixed)
-    free = None if free is None else of_machine(words("free", free))
-    asked = Asked(free, prior, bounds, own, by_set(roles), of_machine(fixed), of_effects=of_effects)
+    given, uncertain = uncertain_sets(machine, with_held(given, fixed), stated)
+    asked = Asked(
+        None if free is None else of_machine(words("free", free)), prior, bounds, own,
+        by_set(roles), of_machine(fixed),
+        of_effects=of_effects, uncertainty=stated, uncertain_roles=uncertain,
+    )  # fmt: skip
     named, drop_outliers, drop_slack = left_out(drop, sum(len(data.rows) for data in given))
     rows = prepare(machine, given, holdout, named, bool(own))
     chosen = parameters(machine, rows.fitted, asked)

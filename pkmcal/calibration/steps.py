@@ -208,9 +208,10 @@ def result(rows: Rows, fit: Fit, held: HeldOut, find_slack: bool) -> Identificat
     robots = _robots(problem.exact, estimate.evaluation)
     fits = misfit(estimator, estimate, sure, (fit.start, fit.end))
     cells = _found_slack(problem) if find_slack and fits["outliers"] else problem.slack
+    table = parameter_table(estimator, estimate, sure)
     return Identification(
-        **parameter_table(estimator, estimate, sure),
-        **identifiability(estimator, estimate),
+        **table,
+        **identifiability(estimator, estimate, len(chosen) - len(table["free"])),
         **fits,
         **repeats(sure),
         **vars(held),
@@ -220,6 +221,7 @@ def result(rows: Rows, fit: Fit, held: HeldOut, find_slack: bool) -> Identificat
         robot=robots[chosen.sessions[-1] if chosen.sessions else ""],
         robots=_of_sessions(robots, held),
         prior_test=tested_prior(estimator, estimate),
+        uncertainty_test=tested_prior(estimator, estimate, of_uncertain=True),
         fit=fit,
         datum=fit.datum,
         dropped=rows.dropped,

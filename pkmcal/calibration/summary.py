@@ -11,8 +11,10 @@ import numpy as np
 from pkmcal import display
 from pkmcal.arrays import BoolArray
 from pkmcal.display import Table, first_rows
+from pkmcal.estimation.identifiability import listed
 from pkmcal.fitted.distances import Distances
 from pkmcal.fitted.holdout import HeldOut
+from pkmcal.fitted.nuisances import Nuisance
 from pkmcal.fitted.solution import Solution
 from pkmcal.statistics.noise import SIGNIFICANT
 
@@ -190,6 +192,15 @@ def own_numbers(found: HeldOut) -> Table:
             text = f"{display.fixed(number, 4)} ± {deviation:g}"
         rows.append([label, text])
     return Table(["found for the points held out", "value"], rows, left=1)
+
+
+def fitted_along(beside: Sequence[Nuisance]) -> str:
+    """How many numbers were fitted along since they are uncertain, and which moved."""
+    far = [each.name for each in beside if each.moved]
+    shown = f"; in the table those that moved by more than twice it: {listed(far)}" if far else ""
+    return filled(
+        "", f"{len(beside)} numbers were fitted along within their stated uncertainty{shown}"
+    )
 
 
 def bounds(names: Sequence[str]) -> str:

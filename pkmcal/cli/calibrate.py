@@ -21,6 +21,7 @@ from pkmcal.cli.geometry_options import (
     matching,
     read_coefficients,
     read_prior,
+    read_uncertainty,
 )
 from pkmcal.cli.inputs import Inputs
 from pkmcal.cli.measured import (
@@ -37,7 +38,7 @@ from pkmcal.cli.measured import (
     rows_to_drop,
     without_lines,
 )
-from pkmcal.cli.options import Force, Free, Json, Prior, RobotOrArm
+from pkmcal.cli.options import Consider, Force, Free, Json, Prior, RobotOrArm, Uncertainty
 from pkmcal.cli.output import Output, say
 from pkmcal.cli.progress import progress
 from pkmcal.cli.sessions import in_sessions
@@ -63,6 +64,8 @@ def calibrate(
     ],
     free: Free = None,
     prior: Prior = None,
+    uncertainty: Uncertainty = None,
+    consider: Consider = None,
     holdout: Annotated[
         str | None,
         typer.Option(
@@ -294,6 +297,7 @@ def calibrate(
             fix=[*fixed, *held_by_datum],
             drop=[*dropped, *(each for each, asked in found_rows.items() if asked)],
             effects=moving,
+            uncertainty=read_uncertainty(uncertainty or [], consider or [], machine),
         )
     rigid = rigid_arm(found) if output is not None and urdf else None
     if output is not None:
@@ -369,9 +373,14 @@ def _save(found: pk.Identification, path: Path, read: Inputs, robot: str) -> Non
     if isinstance(calibrated, pk.SerialArm) or isinstance(source, str):
         calibrated.save(path, read.comment())
         return
-    columns = found.fit.parameters.geometry_of()
-    names = [calibrated.geometry.names[place] for place in found.fit.parameters.places]
-    known = dict(zip(names, found.stderr[columns].tolist(), strict=True))
+    chosen = found.fit.parameters
+    sigma = {each.name: each.stderr for each in found.nuisances}
+    sigma |= dict(zip(found.free, found.stderr.tolist(), strict=True))
+    names = [calibrated.geometry.names[place] for place in chosen.places]
+    known = {
+        name: sigma[chosen.names[column]]
+        for name, column in zip(names, chosen.geometry_of().tolist(), strict=True)
+    }
     calibrated.save(path, read.comment(), like=source, deviations=known)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pkmcal.diagnostics import (
+    causes,
     course,
     families,
     gain,
@@ -11,6 +12,7 @@ from pkmcal.diagnostics import (
     machine,
     noise,
     priors,
+    regions,
     rounded,
     rows,
     sag,
@@ -23,6 +25,6 @@ from pkmcal.diagnostics.diagnosis import verified
 CHECKS = verified((
     *held_out.CHECKS, *units.CHECKS, *families.CHECKS, *machine.CHECKS, *loads.CHECKS,
     *search.CHECKS, *rows.CHECKS, *rounded.CHECKS, *noise.CHECKS, *priors.CHECKS, *course.CHECKS,
-    *gain.CHECKS, *sag.CHECKS, *waves.CHECKS,
+    *causes.CHECKS, *regions.CHECKS, *gain.CHECKS, *sag.CHECKS, *waves.CHECKS,
 ))  # fmt: skip
 AT_ONCE = tuple(check for check in CHECKS if check.at_once)

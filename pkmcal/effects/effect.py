@@ -26,11 +26,14 @@ class Moved(NamedTuple):
         Its derivative by each argument of the effect that may be estimated.
     growth : ndarray (N,) or None
         Relative growth of places on the platform.
+    growth_by : mapping of str to ndarray (N, w)
+        Its derivative by each argument that may be estimated.
     """
 
     twist: FloatArray
     by: Mapping[str, FloatArray] = {}
     growth: FloatArray | None = None
+    growth_by: Mapping[str, FloatArray] = {}
 
 
 class EffectOfRows(Protocol):

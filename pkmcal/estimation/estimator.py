@@ -229,10 +229,13 @@ class Estimator:
                 singular, basis = known.at_start[0]
                 return ((singular / factors[0], basis),) * 2
         factor = self._triangle(evaluation, noise, last)
-        data = decompose(factor)
         if not self._priors:
+            data = decompose(factor)
             return data, data
-        return data, decompose(factor, self.search.prior(evaluation.theta))
+        prior, chosen = self.search.prior(evaluation.theta), self.equations.parameters
+        # what is fixed but for an uncertainty is known to measurements without a prior, too
+        stated = [prior[chosen.prior_of_uncertain]] if len(chosen.spread) else []
+        return decompose(factor, *stated), decompose(factor, prior)
 
     def _triangle(
         self, evaluation: Evaluation, noise: FloatArray, last: Estimate | None

@@ -34,10 +34,10 @@ def aligned(
     evaluation : Evaluation
         Where the machine is with the present parameters.
     own : ndarray of bool (n,), optional
-        Which parameters may be changed; all by default.
+        Which parameters may be changed; by default all that are not known but for an uncertainty.
     """
     parameters, theta = prediction.parameters, evaluation.theta.copy()
-    free = np.ones(len(parameters), dtype=bool) if own is None else own.copy()
+    free = ~parameters.uncertain if own is None else own & ~parameters.uncertain
     frames, tools = prediction.frames, prediction.tools
     _with_known_frame(prediction, evaluation, theta, free)
     by_points = [

@@ -13,12 +13,13 @@ from dataclasses import replace
 import numpy as np
 
 from pkmcal.arguments import did_you_mean, shown
-from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.arrays import FloatArray
 from pkmcal.estimation.fit_data import PLACE, FitData, Numbers
 from pkmcal.estimation.parameters import FRAME, Asked, Bounds, Parameters
 from pkmcal.estimation.prior_functions import is_function, prior_functions
 from pkmcal.estimation.scales import unit_scales
 from pkmcal.estimation.sessions import Scope, label, matches, scopes
+from pkmcal.estimation.uncertain_numbers import spread, uncertain_names
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.geometry.elastic import is_kinematic
 from pkmcal.kinematics.calibratable import Calibratable
@@ -47,7 +48,9 @@ def parameters(
     ValueError, TypeError
         An unknown or tied name, nothing free, a prior or a bound that does not fit.
     """
-    geometry, places = robot.geometry, _free_places(robot, asked)
+    geometry = robot.geometry
+    free, along = _free_names(robot, asked)
+    places = np.array([geometry.names.index(name) for name in (*free, *along)], dtype=np.intp)
     beside = _beside_geometry(datasets)
     ends = np.cumsum([len(places), *(len(each.names) for each in beside.values())]).tolist()
     blocks = dict(zip(beside, map(slice, ends, ends[1:]), strict=False))
@@ -55,8 +58,17 @@ def parameters(
     numbers += [name for each in beside.values() for name in each.names]
     scope = scopes(numbers, blocks, asked.per_session, asked.by_set)
     entries = _entries(len(places), scope, blocks, datasets, asked.held_points)
+    fitted_along = {*range(len(free), len(places))}
+    for (role, _), block in blocks.items():
+        if role in asked.uncertain_roles:
+            fitted_along |= {*range(block.start, block.stop)}
+    entries = _without_exact(entries, numbers, fitted_along, asked)
     number_of = np.array([number for number, _ in entries], dtype=np.intp)
     names = tuple(numbers[j] + (f"@{behind}" if behind else "") for j, behind in entries)
+    uncertain = np.isin(number_of, sorted(fitted_along))
+    of_uncertain = spread(
+        asked.uncertainty, [n for n, own in zip(names, uncertain, strict=True) if own]
+    )
     every = [geometry.units[i] for i in places]
     every += [unit for each in beside.values() for unit in each.units]
     _refuse_twice(names)
@@ -76,13 +88,16 @@ def parameters(
     starts = [geometry.values[places], *(each.start for each in beside.values())]
     values = np.concatenate(starts)[number_of]
     count = int(np.count_nonzero(number_of < len(places)))
-    lower, upper = _bounds(asked.bounds, names, values, strict=like is None)
+    found = [n if not own else "" for n, own in zip(names, uncertain, strict=True)]
+    lower, upper = _bounds(asked.bounds, found, values, strict=like is None)
+    prior = _prior(asked, found, scale, count, strict=like is None)
+    prior[uncertain] = np.sqrt(np.diagonal(of_uncertain))
     made = Parameters(
         names=names,
         units=units,
         start=values,
         scale=scale,
-        prior=_prior(asked, names, scale, count, strict=like is None),
+        prior=prior,
         lower=lower,
         upper=upper,
         number_of=number_of,
@@ -94,6 +109,8 @@ def parameters(
         origin={},
         robot=robot,
         asked=asked,
+        uncertain=uncertain,
+        spread=of_uncertain,
     )
     made = replace(made, origin={first: np.zeros(6) for first in made.motions})
     if not isinstance(asked.prior, Mapping):
@@ -123,8 +140,11 @@ def _scale(of_unit: Mapping[str, float], name: str, unit: str) -> float:
     return of_unit[unit]
 
 
-def _free_places(robot: Calibratable, asked: Asked) -> IntArray:
-    """Places of the free numbers in the geometry's values."""
+def _free_names(robot: Calibratable, asked: Asked) -> tuple[list[str], list[str]]:
+    """Numbers of the geometry that are looked for, and those that are uncertain beside them.
+
+    A number that is held is exact.
+    """
     geometry, free = robot.geometry, asked.free
     if free is None:
         free = robot.model.free
@@ -138,12 +158,33 @@ def _free_places(robot: Calibratable, asked: Asked) -> IntArray:
     if not chosen:
         raise ArgumentError("free: name at least one parameter")
     chosen = list(dict.fromkeys([*chosen, *asked.of_effects]))
-    if asked.fix:
-        held = geometry.match(asked.fix, "fix")
+    held = geometry.match(asked.fix, "fix") if asked.fix else []
+    along = uncertain_names(asked.uncertainty, robot, (*chosen, *held))
+    if held:
         chosen = [name for name in chosen if name not in held]
         if not chosen:
             raise ArgumentError("fix: no parameter is left free")
-    return np.array([geometry.names.index(name) for name in chosen], dtype=np.intp)
+    return chosen, along
+
+
+def _without_exact(
+    entries: Sequence[tuple[int, str]],
+    numbers: Sequence[str],
+    fitted_along: set[int],
+    asked: Asked,
+) -> list[tuple[int, str]]:
+    """Parameters without those numbers of frames and points of which no uncertainty is stated."""
+    kept = []
+    for number, behind in entries:
+        name = numbers[number] + (f"@{behind}" if behind else "")
+        if number not in fitted_along or spread(asked.uncertainty, [name])[0, 0] > 0.0:
+            kept.append((number, behind))
+        elif name.startswith(("frame.", "tool.")):
+            raise ArgumentError(
+                f"uncertainty: {name} has none, and other numbers of {name.partition('.')[0]} have"
+                " one: state all six"
+            )
+    return kept
 
 
 def _beside_geometry(datasets: Sequence[FitData]) -> dict[tuple[str, str], Numbers]:
@@ -213,11 +254,10 @@ def _where_read(data: FitData, point: tuple[str, str]) -> tuple[str, ...]:
 def _matching(argument: str, pattern: object, names: Sequence[str], strict: bool) -> list[int]:
     if not isinstance(pattern, str):
         raise ArgumentTypeError(f"{argument}: names must be str, found {pattern!r}")
-    hits = [i for i, name in enumerate(names) if matches(pattern, name)]
+    hits = [i for i, name in enumerate(names) if name and matches(pattern, name)]
     if strict and not hits:
-        raise ArgumentError(
-            f"{argument}: no free parameter matches {pattern!r}{did_you_mean(pattern, names)}"
-        )
+        known = did_you_mean(pattern, filter(None, names))
+        raise ArgumentError(f"{argument}: no free parameter matches {pattern!r}{known}")
     return hits
 
 

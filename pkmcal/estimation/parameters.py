@@ -13,12 +13,14 @@ from typing import Literal
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.core.poses import compose, compose_rates
 from pkmcal.estimation.fit_data import Dependence, FitData
 from pkmcal.estimation.prior_functions import PriorFunction
 from pkmcal.estimation.sessions import NONE, Scope, label
 from pkmcal.estimation.smoothness import smoothness_rows
+from pkmcal.estimation.uncertain_numbers import inverse_root
+from pkmcal.geometry.stated_uncertainty import NOTHING, StatedUncertainty
 from pkmcal.kinematics.calibratable import Calibratable
 
 Prior = float | Mapping[str, float | tuple[float, float]] | None
@@ -47,6 +49,10 @@ class Asked:
     of_effects : mapping of str to float
         Numbers of the geometry that effects free beside `free`, and the standard deviation of what
         is known of each, where `prior` does not name it.
+    uncertainty : StatedUncertainty
+        How wrong numbers may be that are not free.
+    uncertain_roles : frozenset of str
+        What readings depend on and is fitted along, since nothing but an uncertainty is stated.
     """
 
     free: str | Sequence[str] | None = None
@@ -57,6 +63,8 @@ class Asked:
     fix: tuple[str, ...] = ()
     held_points: frozenset[tuple[str, str]] = frozenset()
     of_effects: Mapping[str, float] = field(default_factory=dict)
+    uncertainty: StatedUncertainty = NOTHING
+    uncertain_roles: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +106,10 @@ class Parameters:
         What they were made of.
     functions : tuple of PriorFunction
         What is known of functions of numbers.
+    uncertain : ndarray of bool (n,)
+        Numbers that are not looked for, and fitted along as their uncertainty is stated.
+    spread : ndarray (u, u)
+        Stated covariance of these.
     drawn : ndarray (s,) or None
         By how much functions of numbers and bends of tables of drive laws are off what is stated of
         them, in standard deviations, where that is not 0: in replicates of the bootstrap.
@@ -119,6 +131,8 @@ class Parameters:
     origin: Mapping[int, FloatArray]
     robot: Calibratable
     asked: Asked
+    uncertain: BoolArray
+    spread: FloatArray
     functions: tuple[PriorFunction, ...] = ()
     drawn: FloatArray | None = None
 
@@ -133,7 +147,7 @@ class Parameters:
     def prior_rows(self, theta: FloatArray) -> FloatArray:
         """A row (p, n) for each prior at `theta`: its scaled derivative over its deviation.
 
-        First of parameters, then of functions, then of bends of tables.
+        First of free parameters, then of uncertain ones, of functions, of bends of tables.
         """
         return np.vstack([self._of_parameters, self.off_functions(theta)[1] * self.scale])
 
@@ -158,20 +172,34 @@ class Parameters:
 
     @property
     def prior_names(self) -> list[str]:
-        """What each of `prior_rows` is of."""
-        stated = [n for n, s in zip(self.names, self.prior, strict=True) if np.isfinite(s)]
+        """What each of `prior_rows` is of, but for uncertain numbers."""
+        stated = [self.names[i] for i in self._stated]
         stated += [each.name for each in self.functions]
         return stated + [
             f"the smoothness at {self.names[np.abs(row).argmax()]}"
             for row in self._smooth[0] * self.scale
         ]
 
+    @property
+    def _stated(self) -> IntArray:
+        """Free parameters with a prior of their own."""
+        return np.flatnonzero(np.isfinite(self.prior) & ~self.uncertain)
+
+    @property
+    def prior_of_uncertain(self) -> slice:
+        """Which of `prior_rows` are those of uncertain numbers."""
+        first = len(self._stated)
+        return slice(first, first + len(self.spread))
+
     @cached_property
     def _of_parameters(self) -> FloatArray:
-        sigma = self.prior / self.scale
-        stated = np.flatnonzero(np.isfinite(sigma))
+        sigma, stated = self.prior / self.scale, self._stated
         rows: FloatArray = np.eye(len(sigma))[stated] / sigma[stated, None]
-        return rows
+        if not len(self.spread):
+            return rows
+        along = np.zeros((len(self.spread), len(sigma)))
+        along[:, self.uncertain] = inverse_root(self.spread) * self.scale[self.uncertain]
+        return np.vstack([rows, along])
 
     @cached_property
     def _smooth(self) -> tuple[FloatArray, FloatArray]:

@@ -215,7 +215,6 @@ class Prediction:
         change = np.zeros(predicted.values.shape)
         for effect in effects:
             for machine, rows in self._machines(i, theta):
-                growth = None
                 for place, by_twist in places:
                     at = place[rows]
                     found = effect.moved(machine, pose[at], table.actuators[at], rows, numbers)
@@ -224,11 +223,13 @@ class Prediction:
                     for name, rates in found.by.items():
                         by.setdefault(name, np.zeros((*change.shape, rates.shape[2])))
                         by[name][rows] += by_twist[rows] @ rates
-                    growth = found.growth
-                if growth is not None and "target" in numbers and "target" in predicted.by:
-                    shift = numbers["target"][rows] * growth[:, None]
+                if found.growth is not None and "target" in numbers and "target" in predicted.by:
+                    shift = numbers["target"][rows] * found.growth[:, None]
                     by_target = predicted.by["target"][rows]
                     change[rows] += np.einsum("nki,ni->nk", by_target, shift)
+                    by_growth = by_target @ numbers["target"][rows][:, :, None]
+                    for name, rates in found.growth_by.items():
+                        by[name][rows] += by_growth * rates[:, None, :]
         values = table.sets[i].instrument.corrected(predicted.values, change)
         return replace(predicted, values=values, by=by)
 

@@ -61,6 +61,10 @@ class Uncertainty:
         Of each set, `slipped`.
     coarse : tuple of Coarse
         Components whose residuals are no larger than the steps in which they were read.
+    considered : ndarray (p, k) or None
+        How the basis follows numbers that are not fitted along, in their stated deviations.
+    noise_share : float
+        Of the residuals' variance, what these numbers do not explain.
     """
 
     labels: Labels
@@ -72,6 +76,8 @@ class Uncertainty:
     factors: FloatArray
     slips: FloatArray
     coarse: tuple[Coarse, ...]
+    considered: FloatArray | None = None
+    noise_share: float = 1.0
 
     @property
     def known(self) -> bool:
@@ -94,19 +100,34 @@ class Uncertainty:
         """Covariance (n, n) of the reported parameters; inf where the noise is not known."""
         if not self.known:
             return np.full((len(self.reported),) * 2, np.inf)
-        return self.covariance.of(self.reported)
+        return self.covariance.of(self.reported) + self._beside(self.reported)
 
     @cached_property
     def scaled(self) -> FloatArray:
         """Covariance (n, n) of the scaled parameters."""
-        return self.covariance.of(self.fit.back)
+        return self.covariance.of(self.fit.back) + self._beside(self.fit.back)
+
+    def _beside(self, contrasts: FloatArray) -> FloatArray | float:
+        """What numbers that are not fitted along add to the covariance of contrasts (q, p)."""
+        if self.considered is None:
+            return 0.0
+        follow = contrasts @ self.considered
+        added: FloatArray = follow @ follow.T
+        return added
 
     @cached_property
     def freedom(self) -> FloatArray:
         """Degrees of freedom (n,) of the variances of the reported parameters."""
         if not self.known:
             return np.zeros(len(self.reported))
-        return self.covariance.freedom(self.reported)
+        own = self.covariance.freedom(self.reported)
+        if self.considered is None:
+            return own
+        data = np.diagonal(self.covariance.of(self.reported))
+        known = ((self.reported @ self.considered) ** 2).sum(axis=1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            widened: FloatArray = own * (1.0 + known / data) ** 2  # what is stated is known
+        return np.where(data > 0.0, widened, own)
 
     @property
     def poses(self) -> IntArray:
@@ -117,7 +138,7 @@ class Uncertainty:
     def by_cluster(self) -> FloatArray:
         """Covariance (p, p) in the basis that allows for whatever rows of a pose share."""
         prior = self.fit.prior.T @ self.fit.prior
-        matrix: FloatArray = self.covariance.by_cluster + prior
+        matrix: FloatArray = self.covariance.by_cluster * self.noise_share + prior
         return matrix
 
     def in_units(self, whitened: FloatArray) -> FloatArray:
@@ -174,6 +195,10 @@ class Uncertainty:
 
     def noise_of(self, i: int, family: int = 0) -> Noise:
         """Variances in mm² of one family of set `i`; NaN where nothing shows them."""
+        total, shared = self._noise(i, family)
+        return total * self.noise_share, shared * self.noise_share
+
+    def _noise(self, i: int, family: int) -> Noise:
         stated = self.stated_variances(i, family)
         if self.mixed:
             own = float(self.factors[i] ** 2 if stated is None else stated.mean())

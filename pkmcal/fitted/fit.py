@@ -16,6 +16,7 @@ from pkmcal.estimation.identifiability import decompose
 from pkmcal.estimation.parameters import Parameters
 from pkmcal.estimation.uncertainty import LinearModel, Uncertainty, solved, uncertainty
 from pkmcal.fitted.datum import NO_DATUM, Datum
+from pkmcal.fitted.held_numbers import with_considered
 from pkmcal.fitted.slack import Cell
 from pkmcal.statistics.covariance import CovarianceRule
 
@@ -106,7 +107,9 @@ class Fit:
     @cached_property
     def uncertainty(self) -> Uncertainty:
         """How sure the numbers are; `Uncertainty.equations` are those that were fitted."""
-        return uncertainty(self.estimator, self.estimate, self.linear, self.rule, self.classes)
+        sure = uncertainty(self.estimator, self.estimate, self.linear, self.rule, self.classes)
+        stated = self.estimator.equations.parameters.asked.uncertainty
+        return with_considered(sure, self.estimate.evaluation, stated)
 
     @property
     def covariance(self) -> FloatArray:
@@ -135,5 +138,7 @@ class Fit:
         Of the measurements alone, whatever a prior says.
         """
         basis = self.estimate.state.measured.identifiable
-        along = np.linalg.svd(basis[self.parameters.geometry.stop :], compute_uv=False)
+        chosen = self.parameters
+        beside = np.arange(len(chosen)) >= chosen.geometry.stop
+        along = np.linalg.svd(basis[beside | chosen.uncertain], compute_uv=False)
         return int(basis.shape[1] - np.count_nonzero(along > _LEAST))

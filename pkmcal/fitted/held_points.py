@@ -7,7 +7,7 @@ residuals show, so that neither hides behind the other.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from pkmcal.estimation.estimator import FEW
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.labels import Labels
 from pkmcal.estimation.uncertainty import Uncertainty, stated_variances
+from pkmcal.fitted.held_numbers import considered_errors
 from pkmcal.fitted.later import Later, OwnNumbers
 from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.measurements.measurements import Measurements
@@ -67,14 +68,15 @@ class HeldFamily:
 class Points:
     """Equations (M,) of the points held out, in mm; angles as their arcs.
 
-    Residuals and design, the variance of a reading and of what actuators add to it in mm²,
-    the share of each that numbers of its own session took, the number of its unit, the fitted set
-    that each is like and the number of its family there; and the units. Variances are NaN where
-    the fit shows none of that family.
+    Residuals and design, what considered numbers make of them, the variance of a reading and of
+    what actuators add to it in mm², the share of each that numbers of its own session took, the
+    number of its unit, the fitted set that each is like and the number of its family there; and
+    the units. Variances are NaN where the fit shows none of that family.
     """
 
     residual: FloatArray
     design: FloatArray
+    considered: FloatArray
     reading: FloatArray
     by_actuators: FloatArray
     taken: FloatArray
@@ -99,7 +101,17 @@ class Points:
         added: FloatArray = np.einsum(
             "ij,jk,ik->i", self.design, uncertainty.by_cluster, self.design
         )
+        added += (self.considered**2).sum(axis=1)
         return added
+
+    def whole(self, uncertainty: Uncertainty) -> tuple[FloatArray, FloatArray]:
+        """Design (M, p + k) of all that makes an error, and the covariance of that."""
+        k, matrix = self.considered.shape[1], uncertainty.by_cluster
+        if not k:
+            return self.design, matrix
+        covariance = np.eye(len(matrix) + k)
+        covariance[: len(matrix), : len(matrix)] = matrix
+        return np.hstack([self.design, self.considered]), covariance
 
 
 def points(
@@ -151,6 +163,7 @@ def points(
     return Points(
         residual=stacked([a * part for a, part in zip(arcs, after.residuals, strict=True)]),
         design=by_fitted @ back,
+        considered=considered_errors(rows, equations, after, uncertainty, by_fitted @ back),
         reading=stacked(variances),
         by_actuators=by_sigma,
         taken=taken,
@@ -214,6 +227,7 @@ def odd_rows(points: Points, row: IntArray, count: int, uncertainty: Uncertainty
     The noise is an estimate itself, as good as that of the fitted rows.
     """
     odd = np.zeros(count, dtype=bool)
+    whole, covariance = points.whole(uncertainty)
     if not uncertainty.known or not len(row):
         return odd
     freedom = uncertainty.fit.freedom if uncertainty.fit.freedom >= FEW else np.inf
@@ -225,8 +239,8 @@ def odd_rows(points: Points, row: IntArray, count: int, uncertainty: Uncertainty
     for k in np.unique(lengths[lengths > 0]).tolist():
         alike = np.flatnonzero(lengths == k)
         mine = order[first[alike, None] + np.arange(k)]
-        design, residual = points.design[mine], points.residual[mine]
-        variance = design @ uncertainty.by_cluster @ design.transpose(0, 2, 1)
+        design, residual = whole[mine], points.residual[mine]
+        variance = design @ covariance @ design.transpose(0, 2, 1)
         variance += np.eye(k) * own[mine][:, :, None]
         along = np.linalg.solve(variance, residual[:, :, None])[:, :, 0]
         squares = np.nan_to_num((residual * along).sum(axis=1), posinf=_HUGE)
@@ -281,9 +295,12 @@ def _test(
         return None
     fitted, split = _fitted(uncertainty, points.like[good], points.family[good])
     unit = np.sqrt(own)
+    whole, covariance = points.whole(uncertainty)
+    beside = ((0, 0), (0, points.considered.shape[1]))  # no part of the fit
+    fitted = replace(fitted, design=np.pad(fitted.design, beside))
     held = Lengths(
         points.residual[good] / unit,
-        points.design[good] / unit[:, None],
+        whole[good] / unit[:, None],
         numbered(named.row[good]),
         numbered(named.pose[good]),
         named.component[good],
@@ -293,7 +310,7 @@ def _test(
     common = shared + float(np.mean(points.by_actuators[good] / own)) * total
     of_held = total, min(common, total)
     taken = float(points.taken[good].mean())
-    return holdout_test(fitted, held, split, uncertainty.by_cluster, of_held, taken)
+    return holdout_test(fitted, held, split, covariance, of_held, taken)
 
 
 def _fitted(uncertainty: Uncertainty, sets: IntArray, family: IntArray) -> tuple[Lengths, Noise]:

@@ -13,6 +13,7 @@ from pkmcal.fitted.datum import NO_DATUM, Datum
 from pkmcal.fitted.distances import Distances
 from pkmcal.fitted.fit import Fit
 from pkmcal.fitted.holdout import HeldOut
+from pkmcal.fitted.nuisances import Nuisance
 from pkmcal.fitted.slack import SlackCable
 from pkmcal.kinematics.robot import Robot
 from pkmcal.statistics.prior_test import PriorTest
@@ -29,8 +30,9 @@ else:
 _NAMES = (  # of `to_dict`, in the order in which they are written
     "verdict", "robot", "free", "units", "values", "start", "stderr", "parameter_dof", "interval95",
     "covariance", "covariance_rule", "rank", "gap", "datum", "expansion", "unidentifiable",
-    "gauges", "rms", "rms_before", "holdout_rms", "holdout_rms_before", "holdout_expected",
-    "holdout_contradicts", "holdout_chance", "holdout_outliers", "holdout_unreached", "holdout_off",
+    "nuisances", "gauges", "rms", "rms_before", "holdout_rms", "holdout_rms_before",
+    "holdout_expected", "holdout_contradicts", "holdout_chance", "holdout_outliers",
+    "holdout_unreached", "holdout_off",
     "holdout_off_before", "closure_rms", "closure_rms_before", "chi2_per_dof", "dof", "noise",
     "component_noise", "reading_noise", "pose_noise", "actuator_noise", "tension_noise",
     "tension_rms", "redundancy", "idle", "repeatability", "lack_of_fit", "lack_of_fit_chance",
@@ -53,6 +55,11 @@ class Solution(HeldOut, Generic[Machine]):
         Names (n,): numbers of the geometry, then of an unknown frame and unknown targets.
     units : tuple of str
         Unit of each parameter: "mm", "rad" or "1" (a ratio).
+    columns : ndarray of int
+        Which parameters (n,) of the fit they are: it may have had others, `nuisances`.
+    nuisances : tuple of Nuisance
+        Numbers that were fitted along because their uncertainty is stated. Those that moved by
+        more than twice that are in `free`, too.
     values : ndarray
         Identified values (n,).
     start : ndarray
@@ -175,6 +182,8 @@ class Solution(HeldOut, Generic[Machine]):
         Misfit rms in mm at the start and after each step of the search.
     prior_test : PriorTest or None
         Whether the measurements contradict the prior, where there is one.
+    uncertainty_test : PriorTest or None
+        Whether they contradict the stated uncertainty of `nuisances`, where there are any.
     robots : mapping of str to Robot or SerialArm
         The machine of each session, those that were held out too; empty without `per_session`.
     datum : Datum
@@ -190,6 +199,8 @@ class Solution(HeldOut, Generic[Machine]):
 
     free: tuple[str, ...]
     units: tuple[str, ...]
+    columns: IntArray
+    nuisances: tuple[Nuisance, ...]
     values: FloatArray
     start: FloatArray
     stderr: FloatArray
@@ -236,6 +247,7 @@ class Solution(HeldOut, Generic[Machine]):
     evaluations: int
     history: tuple[float, ...]
     prior_test: PriorTest | None = None
+    uncertainty_test: PriorTest | None = None
     robots: Mapping[str, Machine] = field(default_factory=dict)
     datum: Datum = NO_DATUM
     dropped: tuple[int, ...] = ()

@@ -16,6 +16,7 @@ from pkmcal.arms.inputs import ERRORS
 from pkmcal.arrays import BoolArray, FloatArray, Int32Array, as_rows
 from pkmcal.core import screws
 from pkmcal.exceptions import ArgumentError
+from pkmcal.geometry.stated_uncertainty import NOTHING, StatedUncertainty
 from pkmcal.kinematics.robot import Robot
 
 _OK, _INVALID = 0, 4  # of a row, as in `Forward`
@@ -73,6 +74,10 @@ class FreeByDefault(Protocol):
     @property
     def free(self) -> tuple[str, ...]:
         """Numbers that a calibration frees unless it is given others."""
+
+    @property
+    def uncertainty(self) -> StatedUncertainty:
+        """How wrong numbers may be that it does not look for."""
 
 
 class Calibratable(Protocol):
@@ -164,6 +169,7 @@ class ArmModel:
     """What an arm declares: all its joint errors are free, what its joints add is held."""
 
     free: tuple[str, ...]
+    uncertainty: StatedUncertainty = NOTHING
 
 
 @dataclass(frozen=True, eq=False)

@@ -202,7 +202,8 @@ def _shared_noise(found: Identification, stated: Statement) -> float:
     As good as `sigma` says, and no more than the instrument's own uncertainty; 0 where one of them
     is not stated.
     """
-    variances = [stated_variances(each) for each in found.fit.equations.table.sets]
+    lengths = [each for each in found.fit.equations.table.sets if "mm" in each.units]
+    variances = [stated_variances(each) for each in lengths]
     known = [np.mean(each) for each in variances if each is not None]
     if not known or len(known) < len(variances) or not np.isfinite(stated.expanded):
         return 0.0

@@ -77,7 +77,7 @@ def verdict(found: Identification) -> tuple[str, str]:
 
 def instrument_identified(found: Identification) -> bool:
     """Say whether a frame or points of the instrument are among the parameters."""
-    return len(found.free) > int(found.fit.parameters.geometry.stop)
+    return bool((found.columns >= found.fit.parameters.geometry.stop).any())
 
 
 def export_command(found: Identification) -> str:
@@ -151,7 +151,7 @@ def parameters(found: Identification) -> list[dict[str, Any]]:
     share = _unidentifiable_share(found)
     rows = []
     for i in range(len(found.free)):
-        prior = float(found.fit.parameters.prior[i])
+        prior = float(found.fit.parameters.prior[found.columns[i]])
         rows.append({
             "name": printable(found.free[i]),
             "unit": found.units[i],
@@ -170,8 +170,8 @@ def parameters(found: Identification) -> list[dict[str, Any]]:
 
 def _unidentifiable_share(found: Identification) -> FloatArray:
     """Return how much of each parameter lies in unidentifiable combinations, 0 to 1."""
-    share: FloatArray = np.linalg.norm(found.fit.estimate.state.measured.unidentifiable, axis=1)
-    return share
+    share = np.linalg.norm(found.fit.estimate.state.measured.unidentifiable, axis=1)
+    return np.asarray(share[found.columns])
 
 
 def _knowledge(found: Identification, i: int, prior: float, share: float) -> str:
