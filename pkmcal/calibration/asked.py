@@ -13,6 +13,7 @@ from pkmcal.estimation.parameters import Known
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.fitted.datum import DATUM
 from pkmcal.kinematics.calibratable import Calibratable
+from pkmcal.readings.reading import Reading
 from pkmcal.statistics.covariance import RULES, CovarianceRule
 
 Role = Literal["frame", "target", "attachment"]
@@ -94,7 +95,8 @@ def _each_effect(effects: Any) -> tuple[Any, ...]:
 
 
 def _is_effect(given: Any) -> bool:
-    return any(hasattr(given, name) for name in ("of_rows", "of_machine"))
+    members = any(hasattr(given, name) for name in ("of_rows", "of_machine"))
+    return members and not isinstance(given, Reading)
 
 
 def _require_members(effect: Any) -> None:

@@ -252,6 +252,7 @@ def test_what_is_no_effect_is_named(machine: tuple[pk.Robot, pk.Robot, FloatArra
         ([Sinking], "the class Sinking"),
         (Half(), "an object of class Half has no dependences"),
         (7, "expected such as"),
+        (pk.readings.Position(), "expected such as"),
         ([7], "expected such as"),
     ):
         with pytest.raises(pk.ArgumentTypeError, match=f"^effects: .*{message}"):
