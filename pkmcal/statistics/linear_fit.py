@@ -163,7 +163,10 @@ def sums(rows: FloatArray, key: IntArray) -> FloatArray:
     """Sums of rows (M, ...) that have the same key (M,), in its order."""
     order = np.argsort(key, kind="stable")
     first = np.flatnonzero(np.diff(key[order], prepend=-1))
-    total: FloatArray = np.add.reduceat(rows[order], first, axis=0)
+    in_order = rows[order]
+    if len(first) == len(order):
+        return in_order  # each key has one row
+    total: FloatArray = np.add.reduceat(in_order, first, axis=0)
     return total
 
 
