@@ -364,9 +364,20 @@ class Reading:
         defaults = {each.name: each.default for each in dataclasses.fields(self)}  # type: ignore[arg-type]
         return self.with_fields({name: defaults[name] for name in self.truth})
 
-    def subject(self, m: Measured) -> TextArray | None:
-        """What each row is of beside its target, (N,); None: all rows are of one thing."""
-        return None
+    def subject(self, rows: int) -> IntArray:
+        """Which of several things each of `rows` rows is of beside its target, (N,), from 0.
+
+        Rows differ where a field with an entry for every row does, a second place, an attachment:
+        they repeat no other then.
+        """
+        points = [name for name in self.own_points if np.ndim(getattr(self, name)) == 2]
+        found = np.zeros(rows, dtype=np.intp)
+        for name in (*self.per_row, *points):
+            given = getattr(self, name)
+            if given is not None and len(given) == rows:
+                own = np.unique(np.asarray(given), axis=0, return_inverse=True)[1].reshape(-1)
+                found = found * (int(own.max(initial=0)) + 1) + own
+        return np.unique(found, return_inverse=True)[1].reshape(-1)
 
     def with_fields(self: Own, changes: Mapping[str, Any]) -> Own:
         """The instrument with other fields; arrays become read-only."""
