@@ -63,7 +63,8 @@ def effects_on(
     names: list[str] = []
     free: dict[str, float] = {}
     for each in effects:
-        if not hasattr(each, "of_rows") and not hasattr(each, "of_machine"):
+        known = hasattr(each, "of_rows") or hasattr(each, "of_machine")
+        if isinstance(each, type) or not known:
             raise ArgumentTypeError(
                 f"effects: expected such as pk.Expansion(11.5e-6), found {each!r}"
             )
