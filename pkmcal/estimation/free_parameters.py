@@ -15,6 +15,13 @@ import numpy as np
 from pkmcal.arguments import did_you_mean, shown
 from pkmcal.arrays import FloatArray
 from pkmcal.estimation.fit_data import PLACE, FitData, Numbers
+from pkmcal.estimation.own_residuals import (
+    ROLE,
+    Residual,
+    at_parameters,
+    brought_numbers,
+    residual_name,
+)
 from pkmcal.estimation.parameters import FRAME, Asked, Bounds, Parameters
 from pkmcal.estimation.prior_functions import is_function, prior_functions
 from pkmcal.estimation.scales import unit_scales
@@ -51,7 +58,7 @@ def parameters(
     geometry = robot.geometry
     free, along = _free_names(robot, asked)
     places = np.array([geometry.names.index(name) for name in (*free, *along)], dtype=np.intp)
-    beside = _beside_geometry(datasets)
+    beside = _beside_geometry(datasets) | _of_residuals(asked.residuals, geometry.names)
     ends = np.cumsum([len(places), *(len(each.names) for each in beside.values())]).tolist()
     blocks = dict(zip(beside, map(slice, ends, ends[1:]), strict=False))
     numbers = [geometry.names[i] for i in places]
@@ -113,6 +120,9 @@ def parameters(
         spread=of_uncertain,
     )
     made = replace(made, origin={first: np.zeros(6) for first in made.motions})
+    if like is None:
+        made = replace(made, residuals=asked.residuals)
+        _require_dependence(made)
     if not isinstance(asked.prior, Mapping):
         return made
     start = dict(zip(names, zip(values.tolist(), units, strict=True), strict=True))
@@ -205,6 +215,39 @@ def _beside_geometry(datasets: Sequence[FitData]) -> dict[tuple[str, str], Numbe
     return found
 
 
+def _of_residuals(
+    residuals: Sequence[Residual], known: Sequence[str]
+) -> dict[tuple[str, str], Numbers]:
+    """The numbers that residuals bring, one by one: each is common to all rows."""
+    found: dict[tuple[str, str], Numbers] = {}
+    for each in residuals:
+        if (own := brought_numbers(each)) is None:
+            continue
+        for i, name in enumerate(own.names):
+            if name in known or (ROLE, name) in found:
+                raise ArgumentError(
+                    f"residuals: {residual_name(each)} brings {name}, which there is already"
+                )
+            alone = slice(i, i + 1)
+            found[ROLE, name] = Numbers(
+                own.names[alone], own.units[alone], np.arange(1), own.start[alone]
+            )
+    return found
+
+
+def _require_dependence(chosen: Parameters) -> None:
+    """Refuse residuals that nothing free changes where the search begins."""
+    for each in chosen.residuals:
+        _, slopes = at_parameters(
+            each, chosen.by_name, chosen.rates_by_name, chosen.start, chosen.scale
+        )
+        if not slopes.any(axis=1).all():
+            raise ArgumentError(
+                f"residuals: {residual_name(each)} does not change with any free number where the"
+                " search begins"
+            )
+
+
 def _sessions(datasets: Sequence[FitData]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(name for data in datasets for name in data.measured.sessions))
 
@@ -226,6 +269,9 @@ def _entries(
     found += [(j, name) for name in _sessions(datasets) for j in own if scope[j] == "session"]
     for point, block in blocks.items():
         if point in held:
+            continue
+        if point[0] == ROLE:
+            found += [(j, "") for j in range(block.start, block.stop)]
             continue
         kind = scope[block.start]
         behind = dict.fromkeys(

@@ -17,7 +17,7 @@ from typing import Any, ClassVar, Literal, NamedTuple, Protocol, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pkmcal.arrays import FloatArray, IntArray, TextArray, lots, mm_per_unit
+from pkmcal.arrays import FloatArray, IntArray, lots, mm_per_unit
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.csv_table import Table
 from pkmcal.files.csv_writer import WrittenColumn

@@ -91,7 +91,9 @@ def test_readings_off_where_the_machine_stops_are_named(
     said = doubts(robot, measured(log, noisy(true(rng)(at), rng)))["late-readings"]
     assert said.finding.leaving == leaving
     assert said.finding.share == pytest.approx(share, abs=5 * said.finding.stderr)
-    wanted = ("to the next pose" if leaving else "settle") if share > 0 else "log both at one moment"
+    wanted = (
+        ("to the next pose" if leaving else "settle") if share > 0 else "log both at one moment"
+    )
     assert wanted in said.text
 
 
