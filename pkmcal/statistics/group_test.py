@@ -14,6 +14,7 @@ import numpy as np
 from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.statistics.distributions import f_tail
 from pkmcal.statistics.linear_fit import column_basis, grouped, means, triangle
+from pkmcal.statistics.singular_values import svd
 
 LEAST = 5  # degrees of freedom beside both groups' parameters
 _NEW = 1e-3  # of a column's length that the common parameters must leave of it
@@ -117,7 +118,7 @@ def group_test(
     left = residual - common @ (common.T @ residual)
     own = common * np.where(mine, 1.0, -1.0)[:, None]
     own -= common @ (common.T @ own)
-    basis, sizes, _ = np.linalg.svd(own, full_matrices=False)
+    basis, sizes, _ = svd(own)
     basis = basis[:, sizes > _NEW]
     k = basis.shape[1]
     freedom = (len(residual) if count is None else count) - common.shape[1] - k
