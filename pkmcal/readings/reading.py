@@ -17,7 +17,7 @@ from typing import Any, ClassVar, Literal, NamedTuple, Protocol, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pkmcal.arrays import FloatArray, IntArray, TextArray, lots, mm_per_unit
+from pkmcal.arrays import FloatArray, IntArray, lots, mm_per_unit
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.csv_table import Table
 from pkmcal.files.csv_writer import WrittenColumn
@@ -180,6 +180,9 @@ class Reading:
         several targets. Their columns are ``NAME.x``, ``.y`` and ``.z``.
     truth : tuple of str
         Fields that a simulation is told and nobody who measures knows.
+    stated : tuple of str
+        Other fields that its own columns or their headings state. What is in none of these lists
+        is one number or word for all rows, and has a column ``KIND.FIELD`` in files.
     """
 
     name: ClassVar[str] = ""
@@ -197,6 +200,7 @@ class Reading:
     labels: ClassVar[tuple[str, ...]] = ()
     own_points: ClassVar[tuple[str, ...]] = ()
     truth: ClassVar[tuple[str, ...]] = ()
+    stated: ClassVar[tuple[str, ...]] = ()
 
     # the model ------------------------------------------------------------------------------------
 
