@@ -1,4 +1,4 @@
-"""A search that runs into a singular machine begins again with less of what is hardly determined."""
+"""A search that runs into a singular machine begins again with fewer combinations."""
 
 from __future__ import annotations
 
