@@ -23,6 +23,10 @@ _SHORT = 12  # rows of a table that is not set side by side
 _BETWEEN = 3  # letters between tables side by side
 _REMARKS = 3  # of a verdict that are shown; the report has all
 _SHARED = 0.5  # of a reading's own noise, from which what its pose shares is said
+WIDER = (
+    "± of loss 'cauchy' are for gross rows among sound ones; where the model itself is wrong, 95 %"
+    " intervals held 73 to 84 % on a real arm, those of loss 'linear' 89 to 96 %"
+)
 _FEW = 10.0  # degrees of freedom below which a standard deviation says too little
 
 
@@ -254,6 +258,8 @@ def parameter_rows(table: Solution) -> Iterator[str | Table]:
             "± are half widths of 95 % intervals, by Student's t: as few as"
             f" {least:.2g} degrees of freedom are left",
         )
+    if table.loss == "cauchy":
+        yield filled("", WIDER)
 
 
 def filled(lead: str, text: str) -> str:

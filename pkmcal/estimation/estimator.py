@@ -16,7 +16,7 @@ from pkmcal.estimation.identifiability import (
     decompose,
     directions,
 )
-from pkmcal.estimation.least_squares import Search, Trail
+from pkmcal.estimation.least_squares import Search, SingularError, Trail
 from pkmcal.estimation.loss import Loss, LossName
 from pkmcal.exceptions import ArgumentError
 from pkmcal.statistics import prior_test
@@ -93,11 +93,16 @@ class Estimator:
             # rows that nothing contradicts pin what is not determined
             kept = state.fitted.unidentifiable
             pins = state.fitted.singular[0] * kept.T
-            u, trail = self.search.best(trail, u, state.noise, state.loss, pins)
-            u = u - kept @ (kept.T @ u)
-            trail = self.search.at(trail, u, state.noise)
-            estimate = self._estimate(trail, state)
-            fewer = None if trail.converged else self._fewer(estimate)
+            try:
+                u, trail = self.search.best(trail, u, state.noise, state.loss, pins)
+                u = u - kept @ (kept.T @ u)
+                trail = self.search.at(trail, u, state.noise)
+                estimate = self._estimate(trail, state)
+                fewer = None if trail.converged else self._fewer(state, self._revised(estimate))
+            except SingularError:
+                fewer = self._fewer(state, state)
+                if fewer is None:
+                    raise
             if fewer is not None:
                 state, u = fewer, np.zeros(len(self.scale))
                 trail = replace(trail, near=self.start)
@@ -253,18 +258,18 @@ class Estimator:
                 return grown
         return self.search.triangle(evaluation, noise)
 
-    def _fewer(self, estimate: Estimate) -> IterationState | None:
+    def _fewer(self, state: IterationState, revised: IterationState) -> IterationState | None:
         """The state to begin again with after a search without an end; None where there is none.
 
-        It went along what is hardly determined, far from any machine: less of it is fitted.
+        It went along what is hardly determined, far from any machine or into a singular one: less
+        of it is fitted. `revised` has the noise that the search has shown.
         """
-        revised = self._revised(estimate)
-        worst, last = estimate.state.worst, replace(estimate, state=revised)
+        worst = state.worst
         while worst > _LEAST_WORST * self.start.robot.length:
             worst *= _LESS
-            state = self._state(revised.noise, estimate.state.loss, worst, last)
-            if 0 < state.fitted.rank < estimate.state.fitted.rank:
-                return state
+            fewer = self._state(revised.noise, state.loss, worst)
+            if 0 < fewer.fitted.rank < state.fitted.rank:
+                return replace(fewer, first_freedom=revised.first_freedom)
         return None
 
     def _revised(self, estimate: Estimate) -> IterationState:

@@ -23,6 +23,10 @@ _CONVERGED = (1, 2, 3, 4)  # as MINPACK says it
 Function = Callable[[FloatArray], FloatArray]
 
 
+class SingularError(ArgumentError):
+    """A search came to parameters with which the machine is singular in some pose."""
+
+
 @dataclass(frozen=True, eq=False)
 class Trail:
     """How far a search has come.
@@ -133,7 +137,7 @@ class Search:
 
         Raises
         ------
-        ValueError
+        SingularError
             It does not exist, at a singularity of the machine.
         """
         found = self.own_jacobian(evaluation, noise)
@@ -334,7 +338,7 @@ def _same(one: FloatArray, other: FloatArray) -> bool:
 
 def _finite(jacobian: FloatArray) -> FloatArray:
     if not np.isfinite(jacobian).all():
-        raise ArgumentError(
+        raise SingularError(
             "no geometry near the present one agrees: the fit runs into poses"
             " where the actuators do not hold the machine (type-2 singular)"
         )
