@@ -36,6 +36,7 @@ from pkmcal.diagnostics.sag import sag_that_helps
 from pkmcal.effects.effect import Effects
 from pkmcal.estimation.datasets import as_fit_data, by_set
 from pkmcal.estimation.free_parameters import parameters
+from pkmcal.estimation.held_coefficients import coefficients, of_the_machine, with_held
 from pkmcal.estimation.own_residuals import Residual, checked_residuals
 from pkmcal.estimation.parameters import Asked, Bounds, Prior
 from pkmcal.estimation.uncertain_numbers import uncertain_sets
@@ -123,8 +124,8 @@ def identify(
         number; of a session that is held out such numbers are found from its rows, before these
         are compared with the fit.
     fix : str or sequence of str
-        Numbers of the geometry, by name or wildcard, that keep their present values though `free`
-        or the robot's default set has them.
+        Numbers of the geometry and coefficients of effects, by name or wildcard, that keep their
+        present values though `free`, the robot's default set or the effect has them.
 
         The word "datum" holds as many numbers as the measurements leave open of where the base
         frame and the platform frame lie, and of how the frames between an arm's joints are drawn:
@@ -208,9 +209,13 @@ def identify(
     machine, moving, of_effects = effects_on(machine, effects)
     weighed, rule = loss_and_rule(loss)
     given = as_fit_data(machine, measurements, roles, bool(own), moving)
-    given, uncertain = uncertain_sets(machine, given, stated)
+    of_machine = partial(
+        of_the_machine, coefficients=coefficients(given), names=machine.geometry.names
+    )
+    given, uncertain = uncertain_sets(machine, with_held(given, fixed), stated)
     asked = Asked(
-        free, prior, bounds, own, by_set(roles), fixed,
+        None if free is None else of_machine(words("free", free)), prior, bounds, own,
+        by_set(roles), of_machine(fixed),
         of_effects=of_effects, uncertainty=stated, uncertain_roles=uncertain,
         residuals=checked_residuals(residuals),
     )  # fmt: skip

@@ -6,6 +6,7 @@ And with which start, prior and bounds, by the names that the user states.
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -77,6 +78,7 @@ def parameters(
     )
     every = [geometry.units[i] for i in places]
     every += [unit for each in beside.values() for unit in each.units]
+    _refuse_twice(names)
     units = tuple(str(every[j]) for j in number_of)
     of_unit = unit_scales(robot, [data.measured for data in datasets])
     of_number = [np.full(len(places), np.nan)]  # where the unit says the scale
@@ -127,6 +129,16 @@ def parameters(
     columns = {session: made.geometry_of(session) for session in made.sessions or ("",)}
     given = (asked.prior, robot, start, places, columns)
     return replace(made, functions=prior_functions(*given, strict=like is None))
+
+
+def _refuse_twice(names: Sequence[str]) -> None:
+    """Refuse two parameters of one name: what is said of one would be taken for the other."""
+    for name, several in Counter(names).items():
+        if several > 1:
+            raise ArgumentError(
+                f"{name}: {several} different parameters have this name; a reading or an effect"
+                " has to give its numbers names that no others have"
+            )
 
 
 def _scale(of_unit: Mapping[str, float], name: str, unit: str) -> float:
