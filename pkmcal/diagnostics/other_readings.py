@@ -121,4 +121,6 @@ def exchanges(measured: Measurements) -> Iterator[tuple[str, Measurements]]:
         order = columns.copy()
         order[[a, b]] = b, a
         swapped = replace(measured, actuators=measured.actuators[:, order])
-        yield f"q{a + 1} and q{b + 1} are exchanged", swapped
+        one, other = f"q{a + 1}", f"q{b + 1}"
+        typed = f" (--rename {one}={other} --rename {other}={one}, if the file calls them so)"
+        yield f"{one} and {other} are exchanged{typed if measured.file else ''}", swapped
