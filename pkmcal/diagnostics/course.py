@@ -46,8 +46,9 @@ CHECKS = (
     ),
     Check(
         name="two-machines", about="sets, sessions, halves or every second row want other numbers",
-        unless=("grave", "copies", "displaced-target"), run=lambda found: at_most_one(apart(found)),
-        level_of=lambda found, seen: "doubt" if seen.found else None,
+        unless=("grave", "copies", "displaced-target"), levels=("doubt", "remark"),
+        run=lambda found: at_most_one(apart(found)),
+        level_of=lambda found, seen: _level(found, seen) if seen.found else None,
         say=lambda found, seen: str(seen),
     ),
     Check(

@@ -15,6 +15,8 @@ from pkmcal.statistics.group_test import few_equations, group_test
 from pkmcal.statistics.linear_fit import numbered
 
 CHANCE = 1e-3  # below which a group of rows is of another machine
+_LARGE = 0.8  # times the residuals, above which errors of a model may be as large
+_APART = 0.3  # of the variance of belonging to the group that the actuators explain
 
 
 @dataclass(frozen=True)
@@ -30,11 +32,20 @@ class Apart:
         of groups that were tested.
     residual : float
         Standard deviation of the residuals with numbers of its own, over that with common ones.
+    elsewhere : bool
+        Whether it was measured at other places than the other rows, or of other things: then a
+        model that is slightly wrong shows alike.
     """
 
     group: str
     chance: float
     residual: float
+    elsewhere: bool
+
+    @property
+    def large(self) -> bool:
+        """Whether it is more than a model that is slightly wrong shows."""
+        return self.residual < _LARGE and not self.elsewhere
 
     @property
     def found(self) -> bool:
@@ -42,6 +53,13 @@ class Apart:
         return self.chance < CHANCE
 
     def __str__(self) -> str:
+        if self.elsewhere:
+            return (
+                f"{self.group}, measured at other places than the other rows, and these fit better"
+                f" with numbers of their own, {self.residual:.2g} times the residuals"
+                f" ({chance_text(self.chance)}): the model misses something there, or the machine"
+                " was changed meanwhile; poses in another order would tell"
+            )
         return (
             f"{self.group} and the other rows are as if of two machines: with numbers of its own"
             f" each has {self.residual:.2g} times the residuals ({chance_text(self.chance)}). Were"
@@ -74,7 +92,24 @@ def apart(found: Solution) -> Apart | None:
         return None
     name = min(known, key=lambda each: known[each].chance)
     best = known[name]
-    return Apart(name, min(1.0, len(known) * best.chance), best.apart)
+    chance = min(1.0, len(known) * best.chance)
+    return Apart(name, chance, best.apart, _elsewhere(found, groups[name]))
+
+
+def _elsewhere(found: Solution, mine: BoolArray) -> bool:
+    """Whether rows (N,) were measured at other places than the rest, or of other things."""
+    table = found.fit.equations.table
+    if len(table.sets) == 1:
+        subject = table.sets[0].instrument.subject(len(mine))
+        if not np.isin(subject[mine], subject[~mine]).any():
+            return True
+    q = np.concatenate([m.actuators for m in table.sets])
+    basis = np.column_stack([np.ones(len(q)), q - q.mean(axis=0)])
+    belongs = mine - mine.mean()
+    fitted = basis @ np.linalg.lstsq(basis, belongs, rcond=None)[0]
+    spread = float((belongs**2).sum())
+    chance = basis.shape[1] / len(q)  # that columns without any meaning explain
+    return spread > 0 and float((fitted**2).sum()) > (_APART + chance) * spread
 
 
 def _groups(found: Solution, visits: Visits) -> Iterator[tuple[str, BoolArray]]:
