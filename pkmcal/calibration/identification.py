@@ -299,7 +299,7 @@ class Identification(Solution[Machine], Result):
         verdict = self.verdict
         yield summary.filled("", str(verdict))
         yield from (summary.filled("  also: ", text) for text in verdict.reasons[1:])
-        yield from (summary.filled("  note: ", text) for text in verdict.remarks)
+        yield from summary.notes(verdict.remarks)
         yield f"{self.robot.name}: {len(self.free)} parameters from {summary.counts(self.read)}"
         if self.sessions:
             yield summary.sessions(self.sessions)

@@ -36,6 +36,8 @@ from pkmcal.diagnostics.sag import sag_that_helps
 from pkmcal.effects.effect import Effects
 from pkmcal.estimation.datasets import as_fit_data, by_set
 from pkmcal.estimation.free_parameters import parameters
+from pkmcal.estimation.held_coefficients import coefficients, of_the_machine, with_held
+from pkmcal.estimation.own_residuals import Residual, checked_residuals
 from pkmcal.estimation.parameters import Asked, Bounds, Prior
 from pkmcal.estimation.uncertain_numbers import uncertain_sets
 from pkmcal.exceptions import ArgumentError, CalibrationWarning
@@ -64,6 +66,7 @@ def identify(
     drop: Drop = None,
     effects: Effects | Literal["auto"] = (),
     uncertainty: Uncertain = None,
+    residuals: Residual | Sequence[Residual] = (),
 ) -> Identification[Given]:
     """Find the geometry that agrees best with measurements.
 
@@ -121,8 +124,8 @@ def identify(
         number; of a session that is held out such numbers are found from its rows, before these
         are compared with the fit.
     fix : str or sequence of str
-        Numbers of the geometry, by name or wildcard, that keep their present values though `free`
-        or the robot's default set has them.
+        Numbers of the geometry and coefficients of effects, by name or wildcard, that keep their
+        present values though `free`, the robot's default set or the effect has them.
 
         The word "datum" holds as many numbers as the measurements leave open of where the base
         frame and the platform frame lie, and of how the frames between an arm's joints are drawn:
@@ -152,6 +155,13 @@ def identify(
         Under "common" are deviations of one amount by which all numbers are wrong alike, of points
         each coordinate: ``{"common": {"target*": 0.3}}``. Under "consider" are those of numbers of
         the geometry that are to stay exactly where they are: nothing but ± allows for them.
+    residuals : function or sequence of functions
+        What else is known, as functions of numbers by name (mm, rad, 1: all of the geometry, and
+        what is found beside it; of a session ``offset5@thursday``): each gives one residual or
+        several, in standard deviations, that are to be 0. They are fitted as a prior is.
+        Derivatives are found by differences, unless the function gives a pair: its residuals and
+        their derivatives by name, ``(r, {"base1.x": dr})``. Its attribute ``numbers`` may state
+        more numbers to be found, by name where each starts, in mm or as ``(value, unit)``.
 
     Returns
     -------
@@ -189,7 +199,7 @@ def identify(
             partial(
                 identify, robot, measurements, free, prior=prior, loss=loss, unknown=unknown,
                 holdout=holdout, bounds=bounds, per_session=per_session,
-                fix=fix, drop=drop,
+                fix=fix, drop=drop, residuals=residuals,
             )
         )  # fmt: skip
     machine = as_machine(robot)
@@ -199,10 +209,15 @@ def identify(
     machine, moving, of_effects = effects_on(machine, effects)
     weighed, rule = loss_and_rule(loss)
     given = as_fit_data(machine, measurements, roles, bool(own), moving)
-    given, uncertain = uncertain_sets(machine, given, stated)
+    of_machine = partial(
+        of_the_machine, coefficients=coefficients(given), names=machine.geometry.names
+    )
+    given, uncertain = uncertain_sets(machine, with_held(given, fixed), stated)
     asked = Asked(
-        free, prior, bounds, own, by_set(roles), fixed,
+        None if free is None else of_machine(words("free", free)), prior, bounds, own,
+        by_set(roles), of_machine(fixed),
         of_effects=of_effects, uncertainty=stated, uncertain_roles=uncertain,
+        residuals=checked_residuals(residuals),
     )  # fmt: skip
     named, drop_outliers, drop_slack = left_out(drop, sum(len(data.rows) for data in given))
     rows = prepare(machine, given, holdout, named, bool(own))

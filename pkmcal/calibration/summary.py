@@ -21,8 +21,17 @@ from pkmcal.statistics.noise import SIGNIFICANT
 _WIDTH = 100  # letters on a line of the terminal
 _SHORT = 12  # rows of a table that is not set side by side
 _BETWEEN = 3  # letters between tables side by side
+_REMARKS = 3  # of a verdict that are shown; the report has all
 _SHARED = 0.5  # of a reading's own noise, from which what its pose shares is said
 _FEW = 10.0  # degrees of freedom below which a standard deviation says too little
+
+
+def notes(remarks: Sequence[str]) -> Iterator[str]:
+    """Remarks of a verdict, as many as a screen takes, and how many more there are."""
+    yield from (filled("  note: ", text) for text in remarks[:_REMARKS])
+    more = len(remarks) - _REMARKS
+    if more > 0:
+        yield f"  {more} more note{'s' * (more > 1)}: in the report (verdict.remarks)"
 
 
 def misfit_table(found: Solution) -> Table:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any, Generic, Literal, TypeVar
 
 from pkmcal.estimation.loss import LIMITS
+from pkmcal.exceptions import ArgumentError
 from pkmcal.fitted.solution import Solution
 
 F = TypeVar("F")
@@ -54,7 +55,15 @@ class Remedy:
     value: Any = None
 
     def applied(self, arguments: Mapping[str, Any]) -> dict[str, Any]:
-        """Arguments of `identify` with this one, beside what it had where it takes several."""
+        """Arguments of `identify` with this one, beside what it had where it takes several.
+
+        Raises
+        ------
+        ValueError
+            A remedy of which only the user knows the value.
+        """
+        if self.value is None:
+            raise ArgumentError(f"{self.argument}: the remedy states no value; state it yourself")
         before = arguments.get(self.argument)
         value = self.value
         if self.argument in _SEVERAL and before is not None:

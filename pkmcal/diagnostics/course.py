@@ -39,14 +39,14 @@ CHECKS = (
         say=lambda found, seen: str(seen),
     ),
     Check(
-        name="late-readings", about="residuals follow the way from the pose before",
+        name="late-readings", about="residuals follow the way from the pose before, or to the next",
         unless=("grave",), run=lambda found: at_most_one(late(found)),
         level_of=lambda found, seen: "doubt" if seen.found else None,
         say=lambda found, seen: str(seen),
     ),
     Check(
         name="two-machines", about="sets, sessions, halves or every second row want other numbers",
-        unless=("grave", "displaced-target"), run=lambda found: at_most_one(apart(found)),
+        unless=("grave", "copies", "displaced-target"), run=lambda found: at_most_one(apart(found)),
         level_of=lambda found, seen: "doubt" if seen.found else None,
         say=lambda found, seen: str(seen),
     ),

@@ -20,6 +20,7 @@ from pkmcal.display import displayed
 from pkmcal.fitted.solution import Solution
 from pkmcal.readings.reading import Family
 from pkmcal.statistics.distributions import f_tail
+from pkmcal.statistics.singular_values import svd
 
 GROSS = 0.05  # share of the machine's size by which measurements may be off before a calibration
 _KEPT = 0.5  # share of a misfit that is left where the fit found nothing of it
@@ -124,7 +125,7 @@ def _follows(residual: FloatArray, predicted: FloatArray) -> float:
     k = x.shape[1]
     products = [x[:, i] * x[:, j] for i in range(k) for j in range(i, k)]
     design = np.column_stack([np.ones(len(x)), x, *products])
-    left, values, _ = np.linalg.svd(design, full_matrices=False)
+    left, values, _ = svd(design)
     basis = left[:, values > 1e-9 * values.max(initial=0.0)]
     n, terms = basis.shape
     if n < 2 * terms:

@@ -1,8 +1,8 @@
-"""Whether readings were taken before the machine had arrived, or logs are not of one moment.
+"""Whether readings were taken before the machine had arrived, or after it left, or logs differ.
 
-Such a reading is short of where the machine stops by a share of the way from the pose before. One
-number says how much; a score test of it, through the machine's own derivatives, sees what is far
-below a row: trials of whole rows that are late do not.
+Such a reading is off where the machine stops by a share of the way from the pose before, or to the
+next. One number says how much; a score test of it, through the machine's own derivatives, sees what
+is far below a row: trials of whole rows that are late do not.
 """
 
 from __future__ import annotations
@@ -22,21 +22,25 @@ CHANCE = 1e-3  # below which readings are late
 
 @dataclass(frozen=True)
 class Late:
-    """By how much readings are late.
+    """By how much readings are late, or after the machine left.
 
     Attributes
     ----------
     share : float
-        Of the way from the pose before; negative where the actuators were read too early.
+        Of the way from the pose before, or to the next; negative where the actuators were read
+        there and not the instrument.
     stderr : float
         Its standard deviation.
     chance : float
-        How likely a share as large would be if they were not.
+        How likely a share as large, of either way, would be if they were not.
+    leaving : bool
+        Whether it is of the way to the next pose.
     """
 
     share: float
     stderr: float
     chance: float
+    leaving: bool
 
     @property
     def found(self) -> bool:
@@ -44,8 +48,16 @@ class Late:
         return self.chance < CHANCE
 
     def __str__(self) -> str:
-        short = f"{100 * abs(self.share):.2g} % of the way from the pose before"
         odds = chance_text(self.chance)
+        if self.leaving:
+            way = f"{100 * abs(self.share):.2g} % of the way to the next pose"
+            return (
+                f"{'readings' if self.share > 0.0 else 'actuators'} are as if"
+                f" {'taken' if self.share > 0.0 else 'logged'} after the machine had gone {way}"
+                f" ({odds}): log both at one moment, when the machine stands; or the rows stand in"
+                " the reversed order of measuring, and readings are late"
+            )
+        short = f"{100 * abs(self.share):.2g} % of the way from the pose before"
         if self.share > 0.0:
             return (
                 f"readings are as if taken {short} before the machine arrived ({odds}): let it"
@@ -63,17 +75,28 @@ def late(found: Solution) -> Late | None:
     sure = found.fit.uncertainty
     if sure.mixed or sure.rounded or not sure.equations.whitening.any_read:
         return None
-    score = score_test(sure.fit, _columns(found))
-    if score is None:
+    visits = visits_of(found)
+    tested = {
+        leaving: score_test(sure.fit, _columns(found, place))
+        for leaving, place in ((False, visits.before), (True, visits.after))
+    }
+    known = {leaving: score for leaving, score in tested.items() if score is not None}
+    if not known:
         return None
-    return Late(float(score.size[0]), float(score.deviation[0]), score.chance)
+    leaving = min(known, key=lambda each: (known[each].chance, -known[each].drop))
+    score = known[leaving]
+    chance = min(1.0, len(known) * score.chance)
+    return Late(float(score.size[0]), float(score.deviation[0]), chance, leaving)
 
 
-def _columns(found: Solution) -> FloatArray:
-    """How equations (M, 1) change with the share of the way that all readings are late by."""
+def _columns(found: Solution, place: FloatArray) -> FloatArray:
+    """How equations (M, 1) change with the share of the way to places (N, n) that readings are off.
+
+    The places are actuator readings.
+    """
     fit = found.fit
     sure, equations, end = fit.uncertainty, fit.equations, fit.end
-    way = visits_of(found).before - np.concatenate([m.actuators for m in equations.table.sets])
+    way = place - np.concatenate([m.actuators for m in equations.table.sets])
     twists = end.machines.actuator_twists(end.states)[np.concatenate(equations.table.pose_of)]
     back = np.split(
         (twists @ way[:, :, None])[:, :, 0], np.cumsum([len(m) for m in equations.table.sets])[:-1]

@@ -13,6 +13,7 @@ from pkmcal.fitted.fit import Fit
 from pkmcal.fitted.solution import Solution
 from pkmcal.statistics.left_out import left_out
 from pkmcal.statistics.linear_fit import numbered
+from pkmcal.statistics.singular_values import svd
 
 CHANCE = 0.01  # below which regions or sessions that were left out are worse than expected …
 _RATIO = 1.2  # … and by how much
@@ -84,7 +85,7 @@ def _strips(fit: Fit) -> IntArray:
     off = q - q.mean(axis=0)
     spread = off.std(axis=0)
     off = off / np.where(spread > 0.0, spread, 1.0)
-    along = np.linalg.svd(off, full_matrices=False)[2][0]
+    along = svd(off)[2][0]
     order = np.argsort(np.argsort(off @ along, kind="stable"), kind="stable")
     strips: IntArray = (order * _STRIPS) // len(order)
     return strips

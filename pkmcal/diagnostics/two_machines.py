@@ -11,8 +11,8 @@ from pkmcal.arrays import BoolArray
 from pkmcal.diagnostics.visits import Visits, visits_of
 from pkmcal.display import chance_text, printable
 from pkmcal.fitted.solution import Solution
-from pkmcal.statistics.group_test import group_test
-from pkmcal.statistics.linear_fit import means, numbered
+from pkmcal.statistics.group_test import few_equations, group_test
+from pkmcal.statistics.linear_fit import numbered
 
 CHANCE = 1e-3  # below which a group of rows is of another machine
 
@@ -57,14 +57,17 @@ def apart(found: Solution) -> Apart | None:
         return None
     visits = visits_of(found)
     row = sure.labels.row
-    use = ~np.isin(sure.equations.table.rows, found.outliers)[row]
+    use = np.flatnonzero(~np.isin(sure.equations.table.rows, found.outliers)[row])
     key = numbered(visits.series[row][use], visits.visit[row][use], sure.labels.component[use])
-    design = means(sure.fit.design[use], key)
-    residual = means(sure.fit.residual[use, None], key)[:, 0]
-    _, where = np.unique(key, return_index=True)
+    groups = dict(_groups(found, visits))
+    cell = np.zeros(len(row), dtype=np.intp)
+    for mine in groups.values():
+        cell = numbered(cell, mine[row].astype(np.intp))
+    few = few_equations(sure.fit.design, sure.fit.residual, use, key, cell)
+    first = np.unique(cell, return_index=True)[1]  # an equation of each cell
     tested = {
-        name: group_test(design, residual, mine[row][use][where])
-        for name, mine in _groups(found, visits)
+        name: group_test(few.design, few.residual, mine[row][first][few.cell], few.count)
+        for name, mine in groups.items()
     }
     known = {name: each for name, each in tested.items() if each is not None}
     if not known:

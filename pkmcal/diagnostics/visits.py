@@ -25,14 +25,16 @@ class Visits:
         Which.
     visit, visits : ndarray of int (N,)
         Which visit of it each row is, from 0, and how many it has.
-    before : ndarray (N, n)
-        Where the actuators were at the visit before; where they are at the first.
+    before, after : ndarray (N, n)
+        Where the actuators were at the visit before, and at the next; where they are at the first
+        and at the last.
     """
 
     series: IntArray
     visit: IntArray
     visits: IntArray
     before: FloatArray
+    after: FloatArray
 
 
 def visits_of(found: Solution) -> Visits:
@@ -59,10 +61,13 @@ def visits_of(found: Solution) -> Visits:
     start = number[first][of]  # the first visit of each series
     previous = q[begins[np.maximum(number - 1, start)]]
     count = np.bincount(of[new])[of]
+    coming = q[begins[np.minimum(number + 1, start + count - 1)]]
     back = np.empty_like(order)
     back[order] = np.arange(len(order))
     fitted = back[: len(found.rows)]
-    return Visits(of[fitted], (number - start)[fitted], count[fitted], previous[fitted])
+    return Visits(
+        of[fitted], (number - start)[fitted], count[fitted], previous[fitted], coming[fitted]
+    )
 
 
 def _known(found: Solution) -> Iterator[tuple[FitData, int]]:

@@ -107,7 +107,9 @@ class Coupling:
             No arm, or no pairs of its joints.
         """
         arm = _arm(machine, self.name)
-        if isinstance(self.pairs, str) or not all(np.shape(pair) == (2,) for pair in self.pairs):
+        if not isinstance(self.pairs, Iterable) or any(
+            np.shape(pair) != (2,) for pair in self.pairs
+        ):
             raise ArgumentError(f"coupling: pairs of joints, such as (5, 4); found {self.pairs!r}")
         terms = []
         for pair in self.pairs:

@@ -79,7 +79,8 @@ class Estimator:
         The search begins at `near`, or else at the start.
         """
         size = self.start.robot.length
-        state = self._state(self._first_noise(), self._first_loss(), size)
+        noise, freedom = self._first_noise()
+        state = replace(self._state(noise, self._first_loss(), size), first_freedom=freedom)
         if not state.fitted.rank:
             names = ", ".join(self.equations.parameters.names)
             raise ArgumentError(f"they depend on none of {names}")
@@ -129,18 +130,22 @@ class Estimator:
         of_units = width[self.equations.blocks.family_of_block]
         return Loss(name, self.equations.blocks.components, of_units)
 
-    def _first_noise(self) -> FloatArray:
+    def _first_noise(self) -> tuple[FloatArray, FloatArray | None]:
         """1 mm where it is not stated; with a prior what the data alone show at the start.
 
         Noise and prior could else excuse each other: much of one leaves little of the other.
+        Where the groups' noise is then not equal, also the `IterationState.first_freedom`.
         """
         ones = np.ones(len(self.unstated))
         if not self._priors or self.loss != "linear":
-            return ones
+            return ones, None
         jacobian = self.search.jacobian(self.start, ones)
         residual = self.equations.residual(self.start, ones)
         alone = self._alone(self.start, ones, jacobian, residual)
-        return ones if alone is None else self._kept(ones * self._scored(alone)[0], ones)
+        if alone is None:
+            return ones, None
+        freedom = alone[1] if self.equations.machines.unknowns else None
+        return self._kept(ones * self._scored(alone)[0], ones), freedom
 
     def _alone(
         self,

@@ -6,6 +6,7 @@ And with which start, prior and bounds, by the names that the user states.
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -14,6 +15,13 @@ import numpy as np
 from pkmcal.arguments import did_you_mean, shown
 from pkmcal.arrays import FloatArray
 from pkmcal.estimation.fit_data import PLACE, FitData, Numbers
+from pkmcal.estimation.own_residuals import (
+    ROLE,
+    Residual,
+    at_parameters,
+    brought_numbers,
+    residual_name,
+)
 from pkmcal.estimation.parameters import FRAME, Asked, Bounds, Parameters
 from pkmcal.estimation.prior_functions import is_function, prior_functions
 from pkmcal.estimation.scales import unit_scales
@@ -50,7 +58,7 @@ def parameters(
     geometry = robot.geometry
     free, along = _free_names(robot, asked)
     places = np.array([geometry.names.index(name) for name in (*free, *along)], dtype=np.intp)
-    beside = _beside_geometry(datasets)
+    beside = _beside_geometry(datasets) | _of_residuals(asked.residuals, geometry.names)
     ends = np.cumsum([len(places), *(len(each.names) for each in beside.values())]).tolist()
     blocks = dict(zip(beside, map(slice, ends, ends[1:]), strict=False))
     numbers = [geometry.names[i] for i in places]
@@ -70,6 +78,7 @@ def parameters(
     )
     every = [geometry.units[i] for i in places]
     every += [unit for each in beside.values() for unit in each.units]
+    _refuse_twice(names)
     units = tuple(str(every[j]) for j in number_of)
     of_unit = unit_scales(robot, [data.measured for data in datasets])
     of_number = [np.full(len(places), np.nan)]  # where the unit says the scale
@@ -111,12 +120,25 @@ def parameters(
         spread=of_uncertain,
     )
     made = replace(made, origin={first: np.zeros(6) for first in made.motions})
+    if like is None:
+        made = replace(made, residuals=asked.residuals)
+        _require_dependence(made)
     if not isinstance(asked.prior, Mapping):
         return made
     start = dict(zip(names, zip(values.tolist(), units, strict=True), strict=True))
     columns = {session: made.geometry_of(session) for session in made.sessions or ("",)}
     given = (asked.prior, robot, start, places, columns)
     return replace(made, functions=prior_functions(*given, strict=like is None))
+
+
+def _refuse_twice(names: Sequence[str]) -> None:
+    """Refuse two parameters of one name: what is said of one would be taken for the other."""
+    for name, several in Counter(names).items():
+        if several > 1:
+            raise ArgumentError(
+                f"{name}: {several} different parameters have this name; a reading or an effect"
+                " has to give its numbers names that no others have"
+            )
 
 
 def _scale(of_unit: Mapping[str, float], name: str, unit: str) -> float:
@@ -193,6 +215,39 @@ def _beside_geometry(datasets: Sequence[FitData]) -> dict[tuple[str, str], Numbe
     return found
 
 
+def _of_residuals(
+    residuals: Sequence[Residual], known: Sequence[str]
+) -> dict[tuple[str, str], Numbers]:
+    """The numbers that residuals bring, one by one: each is common to all rows."""
+    found: dict[tuple[str, str], Numbers] = {}
+    for each in residuals:
+        if (own := brought_numbers(each)) is None:
+            continue
+        for i, name in enumerate(own.names):
+            if name in known or (ROLE, name) in found:
+                raise ArgumentError(
+                    f"residuals: {residual_name(each)} brings {name}, which there is already"
+                )
+            alone = slice(i, i + 1)
+            found[ROLE, name] = Numbers(
+                own.names[alone], own.units[alone], np.arange(1), own.start[alone]
+            )
+    return found
+
+
+def _require_dependence(chosen: Parameters) -> None:
+    """Refuse residuals that nothing free changes where the search begins."""
+    for each in chosen.residuals:
+        _, slopes = at_parameters(
+            each, chosen.by_name, chosen.rates_by_name, chosen.start, chosen.scale
+        )
+        if not slopes.any(axis=1).all():
+            raise ArgumentError(
+                f"residuals: {residual_name(each)} does not change with any free number where the"
+                " search begins"
+            )
+
+
 def _sessions(datasets: Sequence[FitData]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(name for data in datasets for name in data.measured.sessions))
 
@@ -214,6 +269,9 @@ def _entries(
     found += [(j, name) for name in _sessions(datasets) for j in own if scope[j] == "session"]
     for point, block in blocks.items():
         if point in held:
+            continue
+        if point[0] == ROLE:
+            found += [(j, "") for j in range(block.start, block.stop)]
             continue
         kind = scope[block.start]
         behind = dict.fromkeys(

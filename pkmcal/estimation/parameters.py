@@ -16,12 +16,14 @@ import numpy as np
 from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.core.poses import compose, compose_rates
 from pkmcal.estimation.fit_data import Dependence, FitData
+from pkmcal.estimation.own_residuals import Residual, at_parameters, residual_name
 from pkmcal.estimation.prior_functions import PriorFunction
 from pkmcal.estimation.sessions import NONE, Scope, label
 from pkmcal.estimation.smoothness import smoothness_rows
 from pkmcal.estimation.uncertain_numbers import inverse_root
 from pkmcal.geometry.stated_uncertainty import NOTHING, StatedUncertainty
 from pkmcal.kinematics.calibratable import Calibratable
+from pkmcal.kinematics.robot import Robot
 
 Prior = float | Mapping[str, float | tuple[float, float]] | None
 Known = Literal["known", "unknown"]
@@ -53,6 +55,8 @@ class Asked:
         How wrong numbers may be that are not free.
     uncertain_roles : frozenset of str
         What readings depend on and is fitted along, since nothing but an uncertainty is stated.
+    residuals : tuple of callable
+        Residuals that are functions of named numbers.
     """
 
     free: str | Sequence[str] | None = None
@@ -65,6 +69,7 @@ class Asked:
     of_effects: Mapping[str, float] = field(default_factory=dict)
     uncertainty: StatedUncertainty = NOTHING
     uncertain_roles: frozenset[str] = frozenset()
+    residuals: tuple[Residual, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,13 +111,16 @@ class Parameters:
         What they were made of.
     functions : tuple of PriorFunction
         What is known of functions of numbers.
+    residuals : tuple of callable
+        What else is known: residuals that are functions of numbers by name.
     uncertain : ndarray of bool (n,)
         Numbers that are not looked for, and fitted along as their uncertainty is stated.
     spread : ndarray (u, u)
         Stated covariance of these.
     drawn : ndarray (s,) or None
-        By how much functions of numbers and bends of tables of drive laws are off what is stated of
-        them, in standard deviations, where that is not 0: in replicates of the bootstrap.
+        By how much functions of numbers, residuals and bends of tables of drive laws are off what
+        is stated of them, in standard deviations, where that is not 0: in replicates of the
+        bootstrap.
     """
 
     names: tuple[str, ...]
@@ -134,6 +142,7 @@ class Parameters:
     uncertain: BoolArray
     spread: FloatArray
     functions: tuple[PriorFunction, ...] = ()
+    residuals: tuple[Residual, ...] = ()
     drawn: FloatArray | None = None
 
     def __len__(self) -> int:
@@ -147,7 +156,8 @@ class Parameters:
     def prior_rows(self, theta: FloatArray) -> FloatArray:
         """A row (p, n) for each prior at `theta`: its scaled derivative over its deviation.
 
-        First of free parameters, then of uncertain ones, of functions, of bends of tables.
+        First of free parameters, then of uncertain ones, of functions, of residuals, of bends of
+        tables.
         """
         return np.vstack([self._of_parameters, self.off_functions(theta)[1] * self.scale])
 
@@ -161,6 +171,11 @@ class Parameters:
         """How far functions and bends are off what is stated (s,), in deviations; by θ (s, n)."""
         rows, constant = self._smooth
         off: FloatArray = rows @ theta + constant
+        for each in self.residuals[::-1]:
+            values, slopes = at_parameters(
+                each, self.by_name, self.rates_by_name, theta, self.scale
+            )
+            off, rows = np.concatenate([values, off]), np.vstack([slopes, rows])
         if not self.functions:
             return off, rows
         found = [each.at(theta, self.robot, self.places) for each in self.functions]
@@ -175,6 +190,10 @@ class Parameters:
         """What each of `prior_rows` is of, but for uncertain numbers."""
         stated = [self.names[i] for i in self._stated]
         stated += [each.name for each in self.functions]
+        for each in self.residuals:
+            stated += [residual_name(each)] * len(
+                at_parameters(each, self.by_name, self.rates_by_name, self.start, self.scale)[0]
+            )
         return stated + [
             f"the smoothness at {self.names[np.abs(row).argmax()]}"
             for row in self._smooth[0] * self.scale
@@ -264,6 +283,32 @@ class Parameters:
         values: FloatArray = self.robot.geometry.values.copy()
         values[self.places] = theta[self.geometry_of() if columns is None else columns]
         return values
+
+    def by_name(self, theta: FloatArray) -> dict[str, float]:
+        """All numbers at `theta` (n,) by name: of the geometry, and beside it.
+
+        What each session has for itself is there by its name with the session alone.
+        """
+        robot, values = self.robot, self.values_at(theta)
+        if isinstance(robot, Robot):  # numbers may be tied to others
+            values = robot.with_values(values).geometry.values
+        found = dict(zip(robot.geometry.names, values.tolist(), strict=True))
+        for place, scope in zip(self.places.tolist(), self.scope, strict=False):
+            if scope != "common":
+                del found[robot.geometry.names[place]]
+        return found | dict(zip(self.names, self.reported(theta).tolist(), strict=True))
+
+    def rates_by_name(self, theta: FloatArray) -> dict[str, FloatArray]:
+        """Derivative (n,) of each of `by_name` by the parameters."""
+        geometry, columns = self.robot.geometry, self.geometry_of()
+        rates = np.eye(len(geometry.values))
+        if isinstance(self.robot, Robot):
+            chain = self.robot.with_values(self.values_at(theta)).geometry.chain
+            rates[: len(chain)] = chain
+        by_theta = np.zeros((len(rates), len(self)))
+        by_theta[:, columns] = rates[:, self.places]
+        own = dict(zip(self.names, self.reported_rates(theta), strict=True))
+        return dict(zip(geometry.names, by_theta, strict=True)) | own
 
     def aligned(
         self, theta: FloatArray, first: int, frame: FloatArray

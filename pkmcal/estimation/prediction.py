@@ -17,6 +17,7 @@ from pkmcal.estimation.parameters import Parameters
 from pkmcal.estimation.pose_table import PoseTable, pose_table
 from pkmcal.estimation.row_states import RowStates
 from pkmcal.estimation.sessions import NONE, by_parameters
+from pkmcal.estimation.shapes import require_derivatives, require_moved, require_predicted
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.readings import orientation
@@ -157,12 +158,17 @@ class Prediction:
 
     def at(self, pose: FloatArray, theta: FloatArray) -> tuple[Predicted, ...]:
         """Predict the readings of each set at poses (K, 6), with their derivatives."""
-        return tuple(
-            self._moved(i, self._by_geometry_alone(i, pose, theta), pose, theta)
-            if m.components
-            else Predicted(np.empty((len(m), 0)), np.empty((len(m), 0, 6)))
-            for i, m in enumerate(self.table.sets)
-        )
+        found = []
+        for i, m in enumerate(self.table.sets):
+            if not m.components:
+                found.append(Predicted(np.empty((len(m), 0)), np.empty((len(m), 0, 6))))
+                continue
+            alone = self._by_geometry_alone(i, pose, theta)
+            require_predicted(m.instrument, len(m), alone)
+            moved = self._moved(i, alone, pose, theta)
+            require_derivatives(m.instrument, moved, self.numbers[i])
+            found.append(moved)
+        return tuple(found)
 
     def residuals(self, predicted: Sequence[Predicted]) -> tuple[FloatArray, ...]:
         """Measured less predicted of each set."""
@@ -212,6 +218,7 @@ class Prediction:
                 for place, by_twist in places:
                     at = place[rows]
                     found = effect.moved(machine, pose[at], table.actuators[at], rows, numbers)
+                    require_moved(effect, len(rows), found)
                     change[rows] += np.einsum("nki,ni->nk", by_twist[rows], found.twist)
                     for name, rates in found.by.items():
                         by.setdefault(name, np.zeros((*change.shape, rates.shape[2])))

@@ -34,11 +34,22 @@ class Field:
         Whether it is taken from the log of a controller that is joined.
     log_first : bool
         Whether that of a log is taken in the place of the instrument's.
+    unit : str or None
+        Of its one column, where it has no methods for columns of its own; "": numbers without unit,
+        None: names.
     """
 
     name = ""
     logged = False
     log_first = False
+    unit: str | None = ""
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        if cls.columns is not Field.columns and cls.read is Field.read:
+            raise TypeError(f"{cls.__name__}: has columns of its own, and no method read for them")
+        if cls.kept is Field.kept:
+            raise TypeError(f"{cls.__name__}: has no method kept, which checks what is given")
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name
@@ -69,13 +80,20 @@ class Field:
         return {self.name}
 
     def read(self, table: Table, instrument: Reading, units: Sequence[str]) -> Any:
-        """What a table states; None where it states nothing. `units` are those of the actuators."""
-        return None
+        """What a table states; None where it states nothing. `units` are those of the actuators.
+
+        By default its one column: numbers, NaN where a cell is empty, or names.
+        """
+        if self.name not in table.columns:
+            return None
+        if self.unit is None:
+            return np.array(table.texts(self.name))
+        return table.numbers(self.name, self.unit or "1", blank=True)[0]
 
     def columns(self, m: Any, units: Sequence[str]) -> Iterator[WrittenColumn]:
-        """Its columns in a file; none where it is None."""
+        """Its columns in a file; by default one of the entries (N,), none where it is None."""
         if self.of(m) is not None:
-            yield WrittenColumn(self.name, "", self.of(m))
+            yield WrittenColumn(self.name, self.unit or "", self.of(m))
 
     def framed(self, m: Any) -> Iterator[WrittenColumn]:
         """Its columns in a data frame."""

@@ -18,6 +18,7 @@ columns                               meaning
 ``cov.x.y [mm*mm]`` …                 … or their covariances, all on and above the diagonal
 ``actuator_sigma [mm]``               standard deviation of what every actuator read
 ``actuator_sigma.q1 [mm]`` …          … or of each of them
+``KIND.FIELD``                        what an instrument of a class of your own has for all rows
 ``group``                             a whole number, the same for repeats of one pose
 ``session``                           when the row was measured, by a name
 ``time``                              when, in seconds or as a time-stamp
@@ -103,6 +104,7 @@ from pkmcal.measurements.table_layout import (
 )
 from pkmcal.measurements.targets import read_several, read_targets, several_targets
 from pkmcal.readings.closure import Closure
+from pkmcal.readings.constants import headings_of_constants, with_constants
 from pkmcal.readings.points import Position
 from pkmcal.readings.reading import Reading
 from pkmcal.readings.registry import KINDS
@@ -200,6 +202,8 @@ def read_measurements(
     table = _table(path, controller, join, how, joints)
     split_names(table)
     number_groups(table)
+    if kind is not None:
+        arguments.instance("kind", kind, Reading, ", an object of a class of your own")
     readings = [*KINDS.values(), *(() if kind is None else (kind,))]
     points = {name for each in readings for name in each.own_points}
     several = several_targets(table, points)
@@ -209,7 +213,7 @@ def read_measurements(
     actuators, units = read_actuators(table, robot)
     compare(table, units, robot)
     fill_in(table, robot, several)
-    read = _reading(table, several, readings).read(table, units)
+    read = with_constants(_reading(table, several, readings), table).read(table, units)
     fields = _read_fields(table, read, units)
     values: FloatArray | None
     if several:
@@ -251,8 +255,7 @@ def _notes(table: Table) -> tuple[str, ...]:
 
 def _read_fields(table: Table, read: Reading, units: Sequence[str]) -> dict[str, Any]:
     """Fields of the rows that a table states."""
-    found = {each.name: each.read(table, read, units) for each in _FIELDS}
-    return found | {"lines": np.array(table.lines)}
+    return {each.name: each.read(table, read, units) for each in _FIELDS}
 
 
 def _read_probe(table: Table, robot: Actuated | None, offset: ArrayLike | None) -> Measurements:
@@ -347,7 +350,7 @@ def _known(
     names = {*actuators, "probe", "contact", *ANGLES, *orientation_in(table.columns)}
     names |= {f"{point}.{axis}" for point in (*points, *several) for axis in _AXES}
     for reading in readings:
-        names |= reading.names(table)
+        names |= reading.names(table) | headings_of_constants(reading)
     for field in _FIELDS:
         names |= field.names(actuators, components)
     return names

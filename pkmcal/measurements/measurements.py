@@ -32,8 +32,9 @@ from pkmcal.measurements.temperature import Temperature
 from pkmcal.measurements.tension import Tension, TensionSigma, filled_tension
 from pkmcal.measurements.time_stamps import Time
 from pkmcal.measurements.tracker import Tracker
+from pkmcal.readings.constants import columns_of_constants
 from pkmcal.readings.reading import Reading
-from pkmcal.readings.registry import Kind, as_reading
+from pkmcal.readings.registry import Kind, as_reading, stated
 from pkmcal.readings.rows import numbers
 from pkmcal.result import Result
 
@@ -51,9 +52,10 @@ class Measurements(Result):
         `identify` is given ``unknown="frame"``); see `kind`. NaN: not read there.
         One row is taken as it is: actuators (n,) with values (6,), (3,) or a number, and what else
         has one entry a row likewise.
-    kind : str or Reading
-        What was read: a word, or an object of `pkmcal.readings` with what its rows have of their
-        own. "pose": x y z alpha beta gamma of the platform, (N, 6). "position": x y z of the
+    kind : str or Reading, optional
+        What was read, by default as `instrument` has it, or a position: a word, or an object of
+        `pkmcal.readings` with what its rows have of their own.
+        "pose": x y z alpha beta gamma of the platform, (N, 6). "position": x y z of the
         target, (N, 3). "height": z of the target, (N,). "distance", `Distance(attachment)`: from
         the target, which here is a fixed point of the base frame, to a point of the platform, (N,).
         "closure": nothing, `values` is None; what the actuators read is all that is known.
@@ -82,7 +84,8 @@ class Measurements(Result):
     actuator_units : str or sequence of str, optional
         "mm" or "rad", one for all or one per actuator. None: not stated; written as mm.
     instrument : Reading, optional
-        As `kind` has it; `dataclasses.replace` hands it on.
+        As `kind` has it; `dataclasses.replace` hands it on. An object as `kind` is taken in its
+        place, a word has to be its kind.
     file : str
         The name of that file.
     notes : sequence of str
@@ -165,7 +168,7 @@ class Measurements(Result):
         self,
         actuators: ArrayLike,
         values: ArrayLike | None,
-        kind: Kind | Reading | str = "position",
+        kind: Kind | Reading | str | None = None,
         *,
         sigma: ArrayLike | Tracker | None = None,
         target: ArrayLike | None = None,
@@ -178,11 +181,12 @@ class Measurements(Result):
         **fields: Any,
     ) -> None:
         of_rows = row_fields(type(self))
-        stated = {each.name: fields.pop(each.name, None) for each in of_rows}
-        stated |= {"sigma": sigma, "target_index": target_index}
-        if instrument is None or (isinstance(kind, str) and kind != instrument.name):
-            instrument = as_reading(kind)  # type: ignore[arg-type]
-        instrument = adapted("Measurements", instrument, fields, OF_MEASUREMENTS)
+        rowwise = {each.name: fields.pop(each.name, None) for each in of_rows}
+        rowwise |= {"sigma": sigma, "target_index": target_index}
+        present = (*rowwise, *_ARGUMENTS)
+        instrument = adapted(
+            "Measurements", stated(kind, instrument), fields, OF_MEASUREMENTS, present
+        )
         q = numbers("actuators", actuators)
         if q.ndim not in (1, 2) or 0 in q.shape:
             raise ArgumentError(
@@ -202,7 +206,7 @@ class Measurements(Result):
             "notes": words("notes", notes),
         })  # fmt: skip
         for each in of_rows:
-            given = stated[each.name]
+            given = rowwise[each.name]
             self.__setstate__({each.name: None if given is None else each.kept(given, self)})
         self.__setstate__({"target": checked_target(place, self)})
         self.__setstate__({"target_names": names_of_targets(target_names, self)})
@@ -399,10 +403,17 @@ class Measurements(Result):
         values = self.values.reshape(len(self), -1)
         columns |= dict(zip(self.components, values.T, strict=True))
         units = self.actuator_units or ("",) * self.actuators.shape[1]
-        columns |= {each.name: each.values for each in self.instrument.columns(units)}
+        of_instrument = (
+            *self.instrument.columns(units),
+            *columns_of_constants(self.instrument, len(self)),
+        )
+        columns |= {each.name: each.values for each in of_instrument}
         fields = (column for each in row_fields(type(self)) for column in each.framed(self))
         return columns | {column.name: column.values for column in fields}
 
     def _parts(self) -> Iterator[str | Table]:
         yield title(self)
         yield table(self)
+
+
+_ARGUMENTS = ("kind", "target", "target_names", "actuator_units", "instrument", "file", "notes")

@@ -24,6 +24,7 @@ from pkmcal.readings.registry import Kind, as_reading
 from pkmcal.readings.rows import numbers
 from pkmcal.readings.unknowns import POINT
 
+_ARGUMENTS = ("kind", "target", "approach", "tension", "load")  # of `measure`
 _ARM = 200.0  # mm; an instrument good to 0.02 mm over it is good to 1e-4 rad
 
 
@@ -130,7 +131,7 @@ class VirtualMachine:
         n = getattr(self._machine, "n_actuators", actuators.shape[-1])
         if actuators.ndim != 2 or actuators.shape[1] != n or not actuators.size:
             raise ArgumentError(f"q must have shape (N, {n}) or ({n},); found {np.shape(q)}")
-        instrument = adapted("measure", as_reading(kind), former, OF_MEASURE)
+        instrument = adapted("measure", as_reading(kind), former, OF_MEASURE, _ARGUMENTS)
         if tension is not None:
             numbers("tension", tension)  # of what is driven it is known
         width = len(instrument.components)

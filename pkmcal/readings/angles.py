@@ -37,6 +37,7 @@ class Angle(Reading):
     joint: str | None = None
 
     name = "angle"
+    stated = ("joint",)
     components = (("angle", "rad"),)
     planned = False  # a joint has to be named
     starts_by_pose = True

@@ -17,7 +17,7 @@ from typing import Any, ClassVar, Literal, NamedTuple, Protocol, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pkmcal.arrays import FloatArray, IntArray, TextArray, lots, mm_per_unit
+from pkmcal.arrays import FloatArray, IntArray, lots, mm_per_unit
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.csv_table import Table
 from pkmcal.files.csv_writer import WrittenColumn
@@ -180,6 +180,9 @@ class Reading:
         several targets. Their columns are ``NAME.x``, ``.y`` and ``.z``.
     truth : tuple of str
         Fields that a simulation is told and nobody who measures knows.
+    stated : tuple of str
+        Other fields that its own columns or their headings state. What is in none of these lists
+        is one number or word for all rows, and has a column ``KIND.FIELD`` in files.
     """
 
     name: ClassVar[str] = ""
@@ -197,6 +200,7 @@ class Reading:
     labels: ClassVar[tuple[str, ...]] = ()
     own_points: ClassVar[tuple[str, ...]] = ()
     truth: ClassVar[tuple[str, ...]] = ()
+    stated: ClassVar[tuple[str, ...]] = ()
 
     # the model ------------------------------------------------------------------------------------
 
@@ -360,9 +364,20 @@ class Reading:
         defaults = {each.name: each.default for each in dataclasses.fields(self)}  # type: ignore[arg-type]
         return self.with_fields({name: defaults[name] for name in self.truth})
 
-    def subject(self, m: Measured) -> TextArray | None:
-        """What each row is of beside its target, (N,); None: all rows are of one thing."""
-        return None
+    def subject(self, rows: int) -> IntArray:
+        """Which of several things each of `rows` rows is of beside its target, (N,), from 0.
+
+        Rows differ where a field with an entry for every row does, a second place, an attachment:
+        they repeat no other then.
+        """
+        points = [name for name in self.own_points if np.ndim(getattr(self, name)) == 2]
+        found = np.zeros(rows, dtype=np.intp)
+        for name in (*self.per_row, *points):
+            given = getattr(self, name)
+            if given is not None and len(given) == rows:
+                own = np.unique(np.asarray(given), axis=0, return_inverse=True)[1].reshape(-1)
+                found = found * (int(own.max(initial=0)) + 1) + own
+        return np.unique(found, return_inverse=True)[1].reshape(-1)
 
     def with_fields(self: Own, changes: Mapping[str, Any]) -> Own:
         """The instrument with other fields; arrays become read-only."""

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray
+from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.statistics.distributions import f_tail
-from pkmcal.statistics.linear_fit import column_basis
+from pkmcal.statistics.linear_fit import column_basis, grouped, means, triangle
+from pkmcal.statistics.singular_values import svd
 
 LEAST = 5  # degrees of freedom beside both groups' parameters
 _NEW = 1e-3  # of a column's length that the common parameters must leave of it
@@ -36,7 +37,59 @@ class Groups:
     apart: float
 
 
-def group_test(design: FloatArray, residual: FloatArray, mine: BoolArray) -> Groups | None:
+@dataclass(frozen=True, eq=False)
+class FewEquations:
+    """Equations that stand for more: every fit of whole cells has the same sums of squares.
+
+    Attributes
+    ----------
+    design, residual : ndarray (m, p), (m,)
+        At most p + 1 of each cell.
+    cell : ndarray of int (m,)
+        Of each.
+    count : int
+        For how many they stand.
+    """
+
+    design: FloatArray
+    residual: FloatArray
+    cell: IntArray
+    count: int
+
+
+def few_equations(
+    design: FloatArray, residual: FloatArray, use: IntArray, key: IntArray, cell: IntArray
+) -> FewEquations:
+    """Average the equations that have the same key, and reduce each cell to its triangular factor.
+
+    Parameters
+    ----------
+    design, residual : ndarray (M, p), (M,)
+        All of equal variance.
+    use : ndarray of int (u,)
+        Which of them are used.
+    key : ndarray of int (u,)
+        Of each of these; those of one key are of one cell.
+    cell : ndarray of int (M,)
+        By number, from 0.
+    """
+    width = design.shape[1] + 1
+    factors: list[FloatArray] = [np.zeros((0, width)) for _ in range(int(cell.max()) + 1)]
+    count = 0
+    for lot in grouped(key):
+        _, first, own = np.unique(key[lot], return_index=True, return_inverse=True)
+        rows = use[lot]
+        averaged = means(np.column_stack([design[rows], residual[rows]]), own)
+        cell_of, count = cell[rows[first]], count + len(first)
+        for k in np.unique(cell_of):
+            factors[k] = triangle(factors[k], averaged[cell_of == k])
+    whole, number = np.concatenate(factors), np.arange(len(factors))
+    return FewEquations(whole[:, :-1], whole[:, -1], number.repeat([*map(len, factors)]), count)
+
+
+def group_test(
+    design: FloatArray, residual: FloatArray, mine: BoolArray, count: int | None = None
+) -> Groups | None:
     """Test a group against the others; None where too few equations are left to say.
 
     Parameters
@@ -47,6 +100,8 @@ def group_test(design: FloatArray, residual: FloatArray, mine: BoolArray) -> Gro
         All of equal variance.
     mine : ndarray of bool (M,)
         Which equations are of the group.
+    count : int, optional
+        For how many equations these stand, if they are `few_equations`. None: for themselves.
 
     Examples
     --------
@@ -63,10 +118,10 @@ def group_test(design: FloatArray, residual: FloatArray, mine: BoolArray) -> Gro
     left = residual - common @ (common.T @ residual)
     own = common * np.where(mine, 1.0, -1.0)[:, None]
     own -= common @ (common.T @ own)
-    basis, sizes, _ = np.linalg.svd(own, full_matrices=False)
+    basis, sizes, _ = svd(own)
     basis = basis[:, sizes > _NEW]
     k = basis.shape[1]
-    freedom = len(residual) - common.shape[1] - k
+    freedom = (len(residual) if count is None else count) - common.shape[1] - k
     if not k or freedom < LEAST:
         return None
     along = basis.T @ left

@@ -12,6 +12,7 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.statistics.linear_fit import few_rows, grouped, numbered
+from pkmcal.statistics.singular_values import svd
 
 _DETERMINED = 1e-9  # share of the largest singular value: below it a combination is not
 _ALONE = 1e-9  # what a cluster leaves of itself where it alone decides a combination
@@ -68,7 +69,7 @@ def leave_out(
     """
     count, n = jacobian.shape
     key = numbered(cluster)
-    _, singular, turned = np.linalg.svd(few_rows(jacobian, prior), full_matrices=False)
+    _, singular, turned = svd(few_rows(jacobian, prior))
     keep = singular > _DETERMINED * singular.max(initial=0.0)
     back = turned[keep].T / singular[keep]
     design = jacobian @ back
@@ -78,7 +79,7 @@ def leave_out(
     for lot in grouped(key):
         for k in np.unique(key[lot]).tolist():
             rows = lot[key[lot] == k]
-            axes, size, _ = np.linalg.svd(design[rows], full_matrices=False)
+            axes, size, _ = svd(design[rows])
             alone = 1.0 - size**2 <= _ALONE
             share = np.where(alone, 0.0, size**2 / np.where(alone, 1.0, 1.0 - size**2))
             part = left[rows] + axes @ (share * (axes.T @ left[rows]))

@@ -14,6 +14,7 @@ import numpy as np
 from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.statistics.distributions import f_tail
 from pkmcal.statistics.linear_fit import LinearFit
+from pkmcal.statistics.singular_values import svd
 
 _OWN = 0.99  # of what is known of a combination, from which it is the block's own
 
@@ -55,7 +56,7 @@ def left_out(fit: LinearFit, block: IntArray) -> LeftOut:
     squares, whole = 0.0, np.zeros((p, p))  # of the covariance of the residuals left out
     for b in np.unique(block):
         mine = np.flatnonzero(block == b)
-        turn, singular, rows = np.linalg.svd(fit.design[mine], full_matrices=False)
+        turn, singular, rows = svd(fit.design[mine])
         kept = 1.0 - singular**2
         known = kept > 1.0 - _OWN
         factor = np.where(known, 1.0 / np.where(known, kept, 1.0), 0.0)

@@ -20,6 +20,7 @@ from pkmcal.statistics.clusters import Sandwich
 from pkmcal.statistics.distributions import f_tail
 from pkmcal.statistics.linear_fit import ROUNDING, LinearFit, column_basis, triangle
 from pkmcal.statistics.prior_test import data_alone
+from pkmcal.statistics.singular_values import svd
 
 _CHANCE = 0.01  # among all candidates, below which one has shifted …
 _SHARE, _FALL = 0.05, 0.03  # … if it is so much of the disagreement, and the rms falls so much
@@ -145,7 +146,7 @@ def _trial(
 ) -> _Trial | None:
     """What candidate `j` would take off the sum of squares; None if nothing new."""
     beside = columns - common @ (common.T @ columns)
-    turn, singular, _ = np.linalg.svd(beside, full_matrices=False)
+    turn, singular, _ = svd(beside)
     basis = turn[:, singular > _SAME * float(np.linalg.norm(columns))]
     freedom = len(y) - common.shape[1] - basis.shape[1]
     if not basis.shape[1] or freedom < 1:
@@ -196,7 +197,7 @@ def _together(
     columns = [raw[each.trial.candidate] for each in taken]
     n = design.shape[1]
     whole = np.hstack([design, *columns])
-    _, singular, rows = np.linalg.svd(triangle(whole), full_matrices=False)
+    _, singular, rows = svd(triangle(whole))
     keep = singular > ROUNDING * singular[0]
     half = rows[keep].T / singular[keep]
     basis = whole @ half

@@ -77,19 +77,34 @@ def test_sound_rows_are_not_accused(machine: Callable[..., Simulated]) -> None:
 
 
 @MACHINES
+@pytest.mark.parametrize("leaving", [False, True])
 @pytest.mark.parametrize("share", [0.002, -0.002])
-def test_readings_short_of_where_the_machine_stops_are_named(
-    machine: Callable[..., Simulated], share: float
+def test_readings_off_where_the_machine_stops_are_named(
+    machine: Callable[..., Simulated], leaving: bool, share: float
 ) -> None:
-    """Read, or logged, ± 0.2 % of the way from the pose before, though rows are held out."""
+    """Read, or logged, 0.2 % of the way from the pose before or to the next; rows are held out."""
     rng = np.random.default_rng(1)
     robot, q, true = machine(rng)
-    short = q.copy()
-    short[1:] += abs(share) * (q[:-1] - q[1:])
-    at, log = (short, q) if share > 0 else (q, short)
+    there = np.concatenate([q[1:], q[-1:]]) if leaving else np.concatenate([q[:1], q[:-1]])
+    moved = q + abs(share) * (there - q)
+    at, log = (moved, q) if share > 0 else (q, moved)
     said = doubts(robot, measured(log, noisy(true(rng)(at), rng)))["late-readings"]
+    assert said.finding.leaving == leaving
     assert said.finding.share == pytest.approx(share, abs=5 * said.finding.stderr)
-    assert ("settle" if share > 0 else "log both at one moment") in said.text
+    wanted = (
+        ("to the next pose" if leaving else "settle") if share > 0 else "log both at one moment"
+    )
+    assert wanted in said.text
+
+
+@MACHINES
+def test_copied_rows_are_not_those_of_two_machines(machine: Callable[..., Simulated]) -> None:
+    rng = np.random.default_rng(5)
+    robot, q, true = machine(rng)
+    read, twice = noisy(true(rng)(q), rng), np.tile(np.arange(COUNT), 2)
+    said = doubts(robot, measured(q[twice], read[twice]))
+    assert "copies" in said
+    assert "two-machines" not in said
 
 
 @MACHINES

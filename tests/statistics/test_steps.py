@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pkmcal.statistics.extremes import tied_extremes
-from pkmcal.statistics.group_test import group_test
+from pkmcal.statistics.group_test import few_equations, group_test
 from pkmcal.statistics.steps import deviation, step_of
 
 seeds = st.integers(0, 10_000)
@@ -89,6 +89,28 @@ def test_chances_of_groups_are_those_of_two_fits() -> None:
     assert found.apart == pytest.approx(np.sqrt(parts / 34 / (whole / 37)), rel=1e-9)
     assert group_test(x[:8], y[:8], mine[:8]) is None  # too few
     assert group_test(x, y, np.zeros(40, dtype=bool)) is None
+
+
+def test_few_equations_stand_for_the_averages_of_many() -> None:
+    """Visits of one to three equations, more of them than are taken at a time, in two cells."""
+    rng = np.random.default_rng(2)
+    key = np.sort(rng.integers(0, 5000, 10_000))
+    key = np.unique(key, return_inverse=True)[1]
+    cell = key % 2
+    order = rng.permutation(len(key))
+    key, cell = key[order], cell[order]
+    x, y = rng.normal(size=(len(key), 3)), rng.normal(size=len(key))
+    y = y + 0.1 * cell * x[:, 0]
+    few = few_equations(x, y, np.arange(len(key)), key, cell)
+    assert len(few.design) == 8
+    count = np.bincount(key)
+    averaged = np.column_stack([np.bincount(key, each) / count for each in (*x.T, y)])
+    first = np.unique(key, return_index=True)[1]
+    one = group_test(averaged[:, :3], averaged[:, 3], cell[first] == 1)
+    other = group_test(few.design, few.residual, few.cell == 1, few.count)
+    assert one is not None and other is not None
+    assert other.chance == pytest.approx(one.chance, rel=1e-8)
+    assert other.apart == pytest.approx(one.apart, rel=1e-12)
 
 
 def test_alike_groups_are_called_unlike_as_seldom_as_stated() -> None:
