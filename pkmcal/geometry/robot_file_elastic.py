@@ -171,7 +171,7 @@ def _refuse_without(top: Table, described: Sequence[Table]) -> None:
         for key in keys:
             if key in table:
                 why = "pulls at a machine in which nothing yields: state stiffness or [compliance]"
-                table.fail(key, why)
+                table.fail(key, f'{why}, "offset*" = 0 where compliances are to be identified')
 
 
 def _refuse_cables(top: Table, limbs: Limbs) -> None:
