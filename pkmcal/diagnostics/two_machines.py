@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray
+from pkmcal.arrays import BoolArray, FloatArray
 from pkmcal.diagnostics.visits import Visits, visits_of
 from pkmcal.display import chance_text, printable
 from pkmcal.fitted.solution import Solution
 from pkmcal.statistics.group_test import few_equations, group_test
-from pkmcal.statistics.linear_fit import numbered
+from pkmcal.statistics.linear_fit import column_basis, numbered
 
 CHANCE = 1e-3  # below which a group of rows is of another machine
 _LARGE = 0.8  # times the residuals, above which errors of a model may be as large
@@ -97,19 +97,30 @@ def apart(found: Solution) -> Apart | None:
 
 
 def _elsewhere(found: Solution, mine: BoolArray) -> bool:
-    """Whether rows (N,) were measured at other places than the rest, or of other things."""
+    """Whether rows (N,) were measured at other places or loads than the rest, or of other things.
+
+    Places and loads that differ explain much of who belongs to the group, linearly.
+    """
     table = found.fit.equations.table
+    columns = [np.concatenate([m.actuators for m in table.sets])]
     if len(table.sets) == 1:
         subject = table.sets[0].instrument.subject(len(mine))
-        if not np.isin(subject[mine], subject[~mine]).any():
-            return True
-    q = np.concatenate([m.actuators for m in table.sets])
-    basis = np.column_stack([np.ones(len(q)), q - q.mean(axis=0)])
+        columns.append(subject[:, None] == np.unique(subject))
+    if all(m.load is not None for m in table.sets):
+        columns.append(np.concatenate([m.drive_state.load for m in table.sets]))
+    return max(_explained(each, mine) for each in columns) > _APART
+
+
+def _explained(columns: FloatArray, mine: BoolArray) -> float:
+    """Share of the variance of belonging to a group (N,) that columns (N, k) explain, adjusted."""
     belongs = mine - mine.mean()
-    fitted = basis @ np.linalg.lstsq(basis, belongs, rcond=None)[0]
-    spread = float((belongs**2).sum())
-    chance = basis.shape[1] / len(q)  # that columns without any meaning explain
-    return spread > 0 and float((fitted**2).sum()) > (_APART + chance) * spread
+    columns = columns[:, (columns != columns[0]).any(axis=0)]
+    if not columns.size or not belongs.any():
+        return 0.0
+    basis = column_basis(columns - columns.mean(axis=0))
+    freedom = max(1, len(mine) - basis.shape[1] - 1)
+    share = float(((basis.T @ belongs) ** 2).sum() / (belongs**2).sum())
+    return 1.0 - (1.0 - share) * (len(mine) - 1) / freedom
 
 
 def _groups(found: Solution, visits: Visits) -> Iterator[tuple[str, BoolArray]]:

@@ -37,9 +37,9 @@ def tied_extremes(
 
     Examples
     --------
-    >>> values = np.array([0.1, 0.8, 0.8, 0.25, 0.8, 0.63, 0.8, 0.02, 0.5])
+    >>> values = np.array([0.1, 0.8, 0.8, 0.25, 0.8, 0.63, 0.8, 0.02, 0.8])
     >>> [(value, rows.sum().item()) for value, rows in tied_extremes(values, np.arange(9), 0.01)]
-    [(0.8, 4)]
+    [(0.8, 5)]
     """
     from scipy.special import bdtrc
 

@@ -97,6 +97,7 @@ def test_readings_off_where_the_machine_stops_are_named(
     assert wanted in said.text
 
 
+@pytest.mark.filterwarnings("ignore:.*copied, not measured again")
 @MACHINES
 def test_copied_rows_are_not_those_of_two_machines(machine: Callable[..., Simulated]) -> None:
     rng = np.random.default_rng(5)
