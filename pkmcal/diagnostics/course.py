@@ -9,11 +9,11 @@ from pkmcal.diagnostics.displaced import DisplacedTarget, displaced_target
 from pkmcal.diagnostics.drift import Drift, drift
 from pkmcal.diagnostics.late import late
 from pkmcal.diagnostics.measuring_order import MeasuringOrder, measuring_order
-from pkmcal.diagnostics.two_machines import apart
+from pkmcal.diagnostics.two_machines import Apart, apart
 from pkmcal.fitted.solution import Solution
 
 
-def _level(found: Solution, seen: Drift | MeasuringOrder | DisplacedTarget) -> Level | None:
+def _level(found: Solution, seen: Drift | MeasuringOrder | DisplacedTarget | Apart) -> Level | None:
     return "doubt" if seen.large else "remark" if seen.found else None
 
 

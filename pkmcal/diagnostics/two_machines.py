@@ -120,7 +120,7 @@ def _explained(columns: FloatArray, mine: BoolArray) -> float:
     basis = column_basis(columns - columns.mean(axis=0))
     freedom = max(1, len(mine) - basis.shape[1] - 1)
     share = float(((basis.T @ belongs) ** 2).sum() / (belongs**2).sum())
-    return 1.0 - (1.0 - share) * (len(mine) - 1) / freedom
+    return float(1.0 - (1.0 - share) * (len(mine) - 1) / freedom)
 
 
 def _groups(found: Solution, visits: Visits) -> Iterator[tuple[str, BoolArray]]:
