@@ -10,6 +10,7 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray
 from pkmcal.diagnostics.check import Check, Level, Remedy, at_most_one
+from pkmcal.diagnostics.columns import of_rows
 from pkmcal.display import chance_text
 from pkmcal.effects.elasticity import Elasticity
 from pkmcal.exceptions import ArgumentError
@@ -18,7 +19,8 @@ from pkmcal.fitted.solution import Solution
 from pkmcal.geometry.carried import Load
 from pkmcal.geometry.elastic import COMPLIANCE
 from pkmcal.kinematics.robot import Robot
-from pkmcal.statistics.score_test import score_test
+from pkmcal.readings.reading import Predicted
+from pkmcal.statistics.score_test import Columns, score_test
 
 CHANCE = 0.01  # below which residuals follow the loads
 _UNSURE = 0.2  # share of a compliance that its standard deviation exceeds where loads are alike
@@ -52,17 +54,20 @@ def _ignored(found: Solution) -> tuple[IgnoredLoads, ...]:
     return (IgnoredLoads(float("nan")),)
 
 
-def _by_compliances(fit: Fit, robot: Robot) -> FloatArray:
-    """How equations (M, s) change with compliances of legs and screws that are held at 0."""
+def _by_compliances(fit: Fit, robot: Robot) -> Columns:
+    """How equations change with compliances of legs and screws that are held at 0."""
     _, soft, freed = _OF_LEGS.of_machine(robot)
     places = [soft.geometry.names.index(name) for name in freed]
-    table, sure, parts = fit.equations.table, fit.uncertainty, []
-    predicted = fit.equations.prediction.predicted(fit.end)
-    for m, place, seen in zip(table.sets, table.pose_of, predicted, strict=True):
-        carrying = soft if m.load is None else soft.under(Load.of_rows(m.load))
+    table = fit.equations.table
+
+    def change(i: int, rows: slice, seen: Predicted) -> FloatArray:
+        place, load = table.pose_of[i][rows], table.sets[i].load
+        carrying = soft if load is None else soft.under(Load.of_rows(load[rows]))
         twists = carrying.error_twists(fit.end.pose[place], table.actuators[place])
-        parts.append(seen.by_twist @ twists[..., places])
-    return sure.equations.whitening.whitened(parts, sure.factors)
+        moved: FloatArray = seen.by_twist[rows] @ twists[..., places]
+        return moved
+
+    return of_rows(fit, change)
 
 
 def _ignored_level(found: Solution, seen: IgnoredLoads) -> Level:

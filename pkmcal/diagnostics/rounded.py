@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray
+from pkmcal.arrays import FloatArray, lots
 from pkmcal.diagnostics.check import Check, Level, Remedy
 from pkmcal.display import displayed
 from pkmcal.estimation.coarse_readings import DITHERED, Coarse
@@ -69,14 +69,16 @@ def _reach_of_actuators(found: Solution, at: Evaluation) -> list[FloatArray]:
     equations, units = found.fit.equations, at.robot.actuator_units
     read = equations.table.actuators
     half = np.array([0.5 * step_of(read[:, a], unit) for a, unit in enumerate(units)])
-    by_actuators = at.machines.actuator_twists(at.states)
-    reach = []
+    table, reach = equations.table, []
     for i, seen in enumerate(equations.prediction.predicted(at)):
-        moved = np.abs(seen.by_twist @ by_actuators[equations.table.pose_of[i]]) @ half
-        other = equations.table.other_of[i]
-        if other is not None and seen.by_other is not None:
-            moved += np.abs(seen.by_other @ by_actuators[other]) @ half
-        reach.append(moved)
+        whole, other = np.empty(seen.values.shape), table.other_of[i]
+        for rows in lots(len(whole)):
+            twists = at.machines.actuator_twists(at.states, table.pose_of[i][rows])
+            whole[rows] = np.abs(seen.by_twist[rows] @ twists) @ half
+            if other is not None and seen.by_other is not None:
+                twists = at.machines.actuator_twists(at.states, other[rows])
+                whole[rows] += np.abs(seen.by_other[rows] @ twists) @ half
+        reach.append(whole)
     return reach
 
 
