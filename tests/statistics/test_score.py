@@ -59,3 +59,19 @@ def test_what_parameters_take_up_is_not_tested() -> None:
         score_test(replace(fit, residual=np.ones(len(fit.residual))), columns_of(fit.design[:, :2]))
         is None
     )
+
+
+def test_columns_in_lots_are_the_columns_as_a_whole() -> None:
+    """And those in other units say the same of what they explain."""
+    fit = hexapod(20, 3).fit
+    rng = np.random.default_rng(0)
+    fit = replace(fit, residual=rng.normal(size=len(fit.residual)))
+    columns = rng.normal(size=(len(fit.residual), 3))
+    whole = score_test(fit, columns_of(columns))
+    units = np.array([1e-3, 1.0, 1e4])
+    lots = [slice(a, a + 7) for a in range(0, len(columns), 7)]
+    other = score_test(fit, lambda: ((rows, columns[rows] * units) for rows in lots))
+    assert whole is not None and other is not None
+    assert_allclose(other.size * units, whole.size, rtol=1e-9)
+    assert_allclose(other.deviation * units, whole.deviation, rtol=1e-9)
+    assert other.chance == pytest.approx(whole.chance)
