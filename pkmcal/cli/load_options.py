@@ -50,8 +50,8 @@ def carrying(
         raise ArgumentError("--payload-at is the centre of a payload: --payload is missing")
     load = Load(
         0.0 if payload is None else mass("--payload", payload),
-        _three("--payload-at", payload_at),
-        _three("--tool-force", tool_force),
+        three("--payload-at", payload_at),
+        three("--tool-force", tool_force),
     )
     return robot.carrying(load)
 
@@ -82,7 +82,8 @@ def mass(option: str, text: str) -> float:
         raise ArgumentError(f"{option} must be a mass in {units}, found {text!r}") from None
 
 
-def _three(option: str, text: str | None) -> tuple[float, float, float]:
+def three(option: str, text: str | None) -> tuple[float, float, float]:
+    """Three numbers of an option; zeros without it."""
     if text is None:
         return (0.0, 0.0, 0.0)
     row = numbers_on_line(option, text, ("mm", "mm", "mm"), rad=True)

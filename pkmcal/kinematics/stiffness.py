@@ -21,6 +21,7 @@ from pkmcal.result import Result
 from pkmcal.screw import from_pose
 
 _NONE = 1e-12  # of the largest: a compliance that is none
+_SHOWN = 1e-9  # of the geometric mean of two diagonals: a stiffness beside them that is none
 _STEPS = np.arange(1, 11) / 10.0  # of the rated load
 _WAYS = ("+x", "-x", "+y", "-y", "+z", "-z")
 
@@ -130,6 +131,20 @@ class Stiffness(Result):
         worst = np.nanargmin(stiffness)
         x, y, z = direction.reshape(-1, 3)[worst].round(3) + 0.0
         yield f"softest along ({x:g}, {y:g}, {z:g}) of the base"
+        if known.size == 1:
+            names = [f"{what} {axis}" for what in ("moment", "force") for axis in "xyz"]
+            shown = zip(names, matrix_cells(self.matrix.reshape(6, 6)), strict=True)
+            heads = ["N mm/rad, N, N/mm", "turn x", "turn y", "turn z", "x", "y", "z"]
+            yield Table(heads, [[name, *row] for name, row in shown], left=1)
+
+
+def matrix_cells(matrix: FloatArray) -> list[list[str]]:
+    """Show the numbers of a stiffness matrix (6, 6); what is no more than rounding is 0."""
+    size = np.sqrt(np.diagonal(matrix))
+    with np.errstate(invalid="ignore"):
+        least = _SHOWN * np.outer(size, size)
+        shown = np.where(np.abs(matrix) < least, 0.0, matrix)
+    return [[f"{number:.4g}".replace("inf", "∞") for number in row] for row in shown.tolist()]
 
 
 def stiffness(

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
+from pkmcal.files.csv_table import Table
+from pkmcal.measurements.pose_csv import write_poses
 
 LOAD = ("--payload", "11 lb", "--payload-at", "5,0,40", "--tool-force", "0,30,-10")
 
@@ -44,11 +46,31 @@ def test_stiffness_is_that_of_the_package(run: Any, stiff: Path) -> None:
     assert "softest" in run("stiffness", stiff).stdout
 
 
+def test_cut_moves_the_tool_as_the_machine_under_that_force(
+    run: Any, stiff: Path, tmp_path: Path
+) -> None:
+    robot, cut = pk.load(stiff), (3.0, -2.0, 5.0)
+    poses = pk.sample_poses(robot.rigid, 5, seed=3)
+    table = tmp_path / "poses.csv"
+    write_poses(table, poses)
+    out = tmp_path / "map.csv"
+    said = run("stiffness", stiff, table, "--cut", "3,-2,5", "--out", out, "--json").stdout
+    moved = np.array(json.loads(said)["moved"])
+    q = robot.inverse(poses)
+    held = robot.forward(q, guess=poses, load=pk.Load(force=cut)).pose
+    assert np.abs(moved - (held - poses)[:, :3]).max() < 1e-3 * np.abs(moved).max()
+    rows = Table(out)
+    written = np.stack([rows.numbers(f"moved {axis}", "mm")[0] for axis in "xyz"], axis=1)
+    assert np.abs(written - moved).max() < 1e-7
+    assert "3,-2,5 N at the tool move it by" in run("stiffness", stiff, "--cut", "3,-2,5").stdout
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
         (("inverse", "hexapod", "0,0,800,0,0,0", "--payload", "5kg"), "nothing of hexapod yields"),
         (("stiffness", "hexapod"), "nothing of hexapod yields"),
+        (("stiffness", "hexapod", "--compliance", "offset*=1e-4", "--cut", "1"), "--cut"),
         (("stiffness", "hexapod", "--compliance", "offset1"), "--compliance must be NAME=C"),
         (("forward", "3r", "0,0,0", "--payload", "5"), "carries no payload here"),
     ],
