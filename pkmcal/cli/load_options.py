@@ -15,6 +15,7 @@ from pkmcal.kinematics.robot import Robot
 
 _MASSES = {"": 1.0, "kg": 1.0, "g": 1e-3, "t": 1e3, "lb": 0.45359237}  # kg
 _MASS = re.compile(r"(.*?)\s*([a-z]*)")
+_TOOL = re.compile(r"[Tt]?(\d+)\s*=([^,]*)(?:,(.*))?", re.ASCII)
 
 Payload = Annotated[
     str | None,
@@ -30,6 +31,15 @@ PayloadAt = Annotated[
 ToolForce = Annotated[
     str | None,
     typer.Option(metavar="X,Y,Z", help="What pulls at the tool, N, in the axes of the base."),
+]
+ToolLoads = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--load",
+        metavar="TOOL=MASS",
+        help="Of a program, what the machine carries with a tool: 'T1=0.8kg', or with its centre"
+        " of mass in the frame of the tool 'T1=0.8kg,0,0,40'.",
+    ),
 ]
 Yielding = Annotated[
     list[str] | None,
@@ -54,6 +64,20 @@ def carrying(
         three("--tool-force", tool_force),
     )
     return robot.carrying(load)
+
+
+def loads_by_tool(texts: list[str] | None) -> dict[int, Load]:
+    """What the machine carries with each tool."""
+    found: dict[int, Load] = {}
+    for text in texts or ():
+        match = _TOOL.fullmatch(text.strip())
+        if match is None:
+            raise ArgumentError(f"--load must be T1=MASS or T1=MASS,X,Y,Z, found {text!r}")
+        tool = int(match[1])
+        if tool in found:
+            raise ArgumentError(f"--load states T{tool} twice")
+        found[tool] = Load(mass("--load", match[2]), three("--load", match[3]))
+    return found
 
 
 def yielding(robot: Robot, compliances: list[str] | None) -> Robot:

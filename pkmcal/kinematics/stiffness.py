@@ -13,7 +13,7 @@ from pkmcal.arguments import number
 from pkmcal.arrays import FloatArray, as_rows
 from pkmcal.display import Table, fixed
 from pkmcal.exceptions import ArgumentError
-from pkmcal.geometry.carried import CARRIED, Load
+from pkmcal.geometry.carried import Load
 from pkmcal.kinematics.complete import completed
 from pkmcal.kinematics.loaded import LoadedMachine
 from pkmcal.kinematics.robot import Robot, require_parallel
@@ -305,12 +305,10 @@ def _yielding(robot: Robot) -> Robot:
 
 def _carried(robot: Robot, load: Load | None) -> Load:
     """What a machine carries: the load, or the payload that its file states."""
-    if load is not None:
-        load.rows(())
-        return load
-    names = [f"payload.{name}" for name in CARRIED]
-    values = [dict(robot.geometry.items()).get(name, 0.0) for name in names]
-    return Load(values[0], values[1:4], values[4:7], values[7:10])
+    if load is None:
+        return Load.stated(dict(robot.geometry.items()))
+    load.rows(())
+    return load
 
 
 def _with_force(load: Load, force: FloatArray) -> Load:

@@ -65,6 +65,30 @@ def test_cut_moves_the_tool_as_the_machine_under_that_force(
     assert "3,-2,5 N at the tool move it by" in run("stiffness", stiff, "--cut", "3,-2,5").stdout
 
 
+def test_program_is_corrected_for_the_load_of_each_tool(
+    run: Any, refused: Any, stiff: Path, tmp_path: Path
+) -> None:
+    program = tmp_path / "part.ngc"
+    program.write_text("G0 X0 Y0 Z800 A0 B0 C0\nT1 M6\nG0 X5 Y0 Z800 A0 B3 C0\n", encoding="utf-8")
+    words = ("compensate", "hexapod", program, stiff, "--firmware", "linuxcnc")
+    options = ("--payload", "2kg", "--load", "T1=40kg,0,10,60", "--out", tmp_path / "out")
+    assert run(*words, *options).exit_code == 0
+    wanted = pk.compensate_program(
+        pk.load("hexapod"),
+        pk.load(stiff).carrying(pk.Load(2.0)),
+        program,
+        firmware="linuxcnc",
+        loads={1: pk.Load(40.0, (0.0, 10.0, 60.0))},
+    ).text
+    written = (tmp_path / "out" / "part.ngc").read_text(encoding="utf-8")
+    assert wanted in written
+    assert "T1 twice" in refused(*words, "--out", tmp_path, "--load", "T1=1", "--load", "1=2")
+    assert "T1=MASS" in refused(*words, "--out", tmp_path, "--load", "1kg")
+    assert "--load says nothing of a table" in refused(
+        "compensate", stiff, "a.csv", "b.csv", "--load", "T1=1kg"
+    )
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
