@@ -91,7 +91,8 @@ def data(robot: Robot, cloud: bool) -> dict[str, Any]:
     }
     if cloud:
         poses, found["cloud"] = ranges.cloud(robot, spans)
-        found["stiffness"] = yielding.data(given, poses)
+        if given is not robot:
+            found["stiffness"] = yielding.data(given, poses)
     if model.chains is None:
         return found | {"limbs": _limbs(robot, np.array(moves))}
     assert isinstance(machine, ChainMachine)

@@ -14,14 +14,12 @@ _DIGITS = 3
 _WAYS = {"along x": (1.0, 0.0, 0.0), "along y": (0.0, 1.0, 0.0), "along z": (0.0, 0.0, 1.0)}
 
 
-def data(robot: Robot, poses: FloatArray) -> dict[str, Any] | None:
-    """Stiffness at home and over poses (N, 6), N/mm; None where nothing yields.
+def data(robot: Robot, poses: FloatArray) -> dict[str, Any]:
+    """Stiffness of a machine that yields at home and over poses (N, 6), N/mm.
 
     `rows`: along the axes of the base and along the softest direction, at home, the least and the
     median of the poses. `cloud`: along the softest direction at each pose, None where it gives way.
     """
-    if robot is robot.rigid:
-        return None
     found = stiffness(robot, np.vstack([robot.home, poses]))
     with np.errstate(divide="ignore"):  # what does not yield along an axis
         along = {name: 1.0 / found.along(way) for name, way in _WAYS.items()}

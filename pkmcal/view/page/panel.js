@@ -56,7 +56,7 @@ class Panel {
     this.condition = made('p', side, { className: 'hint' })
     this.platform(side, data)
     this.actuators(side, data)
-    if (data.stiffness) this.stiffness(side, data.stiffness)
+    if (data.stiffness) showStiffness(side, data.stiffness)
     const buttons = made('div', side, { className: 'buttons' })
     made('button', buttons, { type: 'button', text: 'Home', onclick: () => { mover.home(); changed(true) } })
     if (data.places) this.places(side, data.places)
@@ -87,21 +87,6 @@ class Panel {
       name: `q${a + 1}`, title: joints?.[a].name ?? `actuator ${a + 1}`, unit: reading ?? unit, range, allowed: stroke, disabled: surplus,
       moved: value => { this.mover.moveActuator(a, value); this.changed() },
     }))
-  }
-
-  // N/mm at home and over the workspace, and the colours that the workspace has by it
-  stiffness(side, { rows, cloud }) {
-    made('h3', side, { text: 'Stiffness' })
-    made('p', side, { className: 'hint', text: 'N/mm, of a force at the tool: at home, and the least and the median over the workspace.' })
-    const table = made('table', side), said = x => (x === null ? '–' : `${x}`)
-    const line = (cells, tag) => made('tr', table, {}, ...cells.map(text => made(tag, null, { text })))
-    line(['', 'home', 'least', 'median'], 'th')
-    for (const [name, ...values] of rows) line([name, ...values.map(said)], 'td')
-    const ends = spread(cloud)
-    if (!ends) return
-    const bar = made('p', side, { className: 'scale' }, `${ends[0]} `)
-    made('i', bar).style.background = `linear-gradient(90deg, ${SCALE.map(colour => `rgb(${colour})`)})`
-    bar.append(` ${ends[1]} N/mm, softest: the colours of the workspace`)
   }
 
   modes(side, { modes }) {

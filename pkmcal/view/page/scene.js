@@ -18,24 +18,6 @@ const COLOURS = {
 const FOCAL = 2.6, PIECE = 0.09 // of the size: long rods are sorted in pieces
 const ASIDE = 26, SIDES = 12 // pixels around the machine, where labels stand; from how many sides it is fitted
 
-const SCALE = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]] // dark is little
-
-// the least and the largest of numbers, of which some may be null
-function spread(values) {
-  const known = values.filter(x => x !== null)
-  return known.length ? [Math.min(...known), Math.max(...known)] : null
-}
-
-// a colour for each number, from the least to the largest; the one for what is bad where there is none
-function tinted(values, bad) {
-  const [low, high] = spread(values) ?? [0, 0]
-  return values.map(x => {
-    if (x === null) return bad
-    const at = ((SCALE.length - 1) * (x - low)) / (high - low || 1), k = Math.min(SCALE.length - 2, Math.floor(at))
-    return `rgb(${mix(SCALE[k], SCALE[k + 1], at - k).map(Math.round)})`
-  })
-}
-
 const shades = {}
 function shade(colour, by) { // towards black or, above 1, white
   return (shades[colour + by] ??= '#' + [1, 3, 5].map(k => {
