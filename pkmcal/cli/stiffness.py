@@ -109,8 +109,7 @@ def stiffness(
 def _columns(found: pk.Stiffness, moved: FloatArray | None) -> dict[str, FloatArray]:
     """What stands beside the poses (N,) in a file."""
     direction, softest = found.softest
-    with np.errstate(divide="ignore"):  # what does not yield along an axis
-        columns = {f"along {axis} [N/mm]": 1.0 / found.along(way) for axis, way in _AXES.items()}
+    columns = {f"along {axis} [N/mm]": found.stiffness_along(way) for axis, way in _AXES.items()}
     columns["softest [N/mm]"] = softest
     columns |= {f"softest {axis}": direction[:, k] for k, axis in enumerate(_AXES)}
     if moved is not None:

@@ -81,6 +81,19 @@ class Stiffness(Result):
         unit = rows[0] / np.linalg.norm(rows[0])
         return np.asarray(unit @ self.compliance[..., 3:, 3:] @ unit)
 
+    def stiffness_along(self, direction: ArrayLike) -> FloatArray:
+        """The force along a direction that moves the tool by 1 mm along it, N/mm, (...).
+
+        The tool is free to go aside. Infinite where it does not yield along the direction.
+
+        Parameters
+        ----------
+        direction : array_like (3,)
+            As for `along`.
+        """
+        with np.errstate(divide="ignore"):
+            return np.asarray(1.0 / np.maximum(self.along(direction), 0.0))
+
     def displacement(self, force: ArrayLike) -> FloatArray:
         """How far a force at the tool, such as that of a cut, moves it: mm, (..., 3).
 
@@ -120,7 +133,7 @@ class Stiffness(Result):
         if not known.any():
             return
         ways = {"along x": [1, 0, 0], "along y": [0, 1, 0], "along z": [0, 0, 1]}
-        found = {name: 1.0 / self.along(way)[known] for name, way in ways.items()}
+        found = {name: self.stiffness_along(way)[known] for name, way in ways.items()}
         found["softest"] = stiffness[known]
         measures = (np.min, np.median, np.max)
         yield Table(

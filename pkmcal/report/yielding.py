@@ -124,8 +124,7 @@ def of(robot: Robot | SerialArm, places: Places | None) -> Yielding | None:
 def _ways(found: Stiffness, softest: FloatArray, good: np.ndarray) -> list[Way]:
     if not good.any():
         return []
-    with np.errstate(divide="ignore"):  # what does not yield along an axis
-        along = {name: 1.0 / found.along(way)[good] for name, way in _WAYS.items()}
+    along = {name: found.stiffness_along(way)[good] for name, way in _WAYS.items()}
     along["softest"] = softest[good]
     ways = []
     for name, each in along.items():

@@ -21,8 +21,7 @@ def data(robot: Robot, poses: FloatArray) -> dict[str, Any]:
     median of the poses. `cloud`: along the softest direction at each pose, None where it gives way.
     """
     found = stiffness(robot, np.vstack([robot.home, poses]))
-    with np.errstate(divide="ignore"):  # what does not yield along an axis
-        along = {name: 1.0 / found.along(way) for name, way in _WAYS.items()}
+    along = {name: found.stiffness_along(way) for name, way in _WAYS.items()}
     along["softest"] = found.softest[1]
     rows = []
     for name, values in along.items():
