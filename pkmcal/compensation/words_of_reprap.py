@@ -19,6 +19,7 @@ REPRAP = Dialect(
     texts=frozenset({"M117"}),
     remark=r'"[^"]*"?|;.*',
     rapid_lines=True,
+    takes_unseen=frozenset({"M109"}),
     by_letters={"G10": OFFSETS, "M291": (AXES, Meaning.MOVES)},
     words=table(
         PRINTERS,
