@@ -120,7 +120,6 @@ CHECKS = (
         level_of=lambda found, finding: "doubt" if finding[1] > HARMFUL else "remark",
         run=_lacking, say=_say_lacking,
         remedies=lambda found, finding: (Remedy("effects", (finding[0].effect,)),),
-        unless=("grave",),
     ),
     Check(
         name="sag", about="whether sag of an arm that was found helps",
