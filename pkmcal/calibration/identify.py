@@ -250,7 +250,7 @@ def _automatic(identified: Callable[..., Identification[Given]]) -> Identificati
         warnings.simplefilter("ignore", CalibrationWarning)
         found = identified(effects=())
     helps = sag_that_helps(found.fit)
-    if helps is not None and helps.effect is not None:
+    if helps is not None:
         return identified(effects=[helps.effect])
     for text in found.warnings:
         warnings.warn(text, CalibrationWarning, stacklevel=4)  # of who called, beyond the adapter

@@ -11,12 +11,16 @@ import numpy as np
 from pkmcal import screw
 from pkmcal.arrays import BoolArray, FloatArray, IntArray, lots
 from pkmcal.diagnostics.columns import of_poses, of_rows
+from pkmcal.effects.gears import Coupling, Harmonics
 from pkmcal.estimation.evaluation import Evaluation
+from pkmcal.exceptions import ArgumentError
 from pkmcal.fitted.fit import Fit
 from pkmcal.fitted.held_numbers import held_numbers
+from pkmcal.fitted.left_out import effect_columns
 from pkmcal.geometry.stated_uncertainty import SCALE, StatedUncertainty
+from pkmcal.kinematics.calibratable import ArmMachine
 from pkmcal.readings.reading import Predicted
-from pkmcal.statistics.score_test import Columns
+from pkmcal.statistics.score_test import Columns, columns_of
 
 _LEAST_TRAVEL = 0.02  # of the machine's length, from which a place is more than an error
 _LEAST_WAY = 1e-9  # of the machine's length, below which actuators have not moved
@@ -134,8 +138,13 @@ def _curved(fit: Fit) -> Columns:
     return _by_each_actuator(fit, (fit.end.actuators - fit.end.actuators.mean(axis=0)) ** 2)
 
 
-def _sag(fit: Fit) -> Columns:
-    """Each actuator yields to the weight of the platform, a force along -z at its origin."""
+def _sag(fit: Fit) -> Columns | None:
+    """Each actuator yields to the weight of the platform, a force along -z at its origin.
+
+    Arms yield to the weight of their links: a check of its own tests that at poses left out.
+    """
+    if isinstance(fit.parameters.robot, ArmMachine):
+        return None
 
     def twists(poses: IntArray) -> FloatArray:
         found = _by_actuators(fit, poses)
@@ -192,6 +201,22 @@ def _some(pattern: str, names: object) -> bool:
     return any(re.match(rf"{stem}\d", name) for name in names)  # type: ignore[attr-defined]
 
 
+def _of_gears(effect: Harmonics | Coupling) -> Callable[[Fit], Columns | None]:
+    """Columns of an effect of an arm's gears."""
+
+    def columns(fit: Fit) -> Columns | None:
+        machine = fit.parameters.robot
+        if not isinstance(machine, ArmMachine):
+            return None
+        try:
+            found = effect_columns(fit, [effect.of_machine(machine)])
+        except ArgumentError:  # fewer joints than it has, or the fit has these numbers
+            return None
+        return None if found is None else columns_of(found)
+
+    return columns
+
+
 CAUSES = (
     Cause("lag: readings before the machine stood still", "wait longer before a reading", _lag),
     Cause(
@@ -207,6 +232,14 @@ CAUSES = (
     Cause(
         "sag under the platform's weight", "state stiffness and mass, and find compliances", _sag
     ),
+    Cause(
+        "eccentric encoders or tilted joints: a wave a turn", "--effects harmonics=1",
+        _of_gears(Harmonics(1)),
+    ),
+    Cause(
+        "coupled joints of the wrist", "--effects coupling=5.4:6.4:6.5",
+        _of_gears(Coupling(((5, 4), (6, 4), (6, 5)))),
+    ),
     Cause("gains", "--free 'gain*' beside the others, or --uncertainty 'gain*=…'", _gains),
     Cause(
         "the scale of the instrument",
@@ -215,7 +248,7 @@ CAUSES = (
     ),
     Cause("targets elsewhere on the platform", "--target unknown (unknown='target')", _lean),
     Cause("joints elsewhere", "--free them, or --uncertainty 'base*=…'", _joints),
-)
+)  # fmt: skip
 
 
 def possible(fit: Fit) -> Iterator[tuple[Cause, Columns]]:

@@ -117,6 +117,23 @@ def compared_by_poses(
     return _comparison(lengths, beside, chosen, fit)
 
 
+def effect_columns(fit: Fit, effects: Sequence[Effect | Changed]) -> FloatArray | None:
+    """Derivative (M, k) of the whitened predicted values by numbers of effects that the fit lacks.
+
+    None where poses have unknowns, or the fit has these numbers.
+    """
+    sure = fit.uncertainty
+    if sure.mixed:
+        return None
+    equations, end = _with_effects(fit, effects)
+    chosen, fitted = equations.parameters, {*fit.parameters.names}
+    new = [i for i, name in enumerate(chosen.names) if name not in fitted]
+    if not new:
+        return None
+    columns: FloatArray = equations.by_parameters(end, sure.factors)[:, new]
+    return columns
+
+
 def _squares(fit: Fit, missed: FloatArray, pose: np.ndarray) -> FloatArray:
     """Sum of the squared lengths of each pose, mm²."""
     length = fit.uncertainty.labels.length
