@@ -46,7 +46,7 @@ def other_readings(
 
 
 def other_values(measured: Measurements) -> Iterator[tuple[str, Measurements]]:
-    """Read what was measured in other units, orders and with other signs, the actuators as given."""
+    """Read what was measured in other units, orders and with other signs; actuators as given."""
     for unit in dict.fromkeys(measured.units):
         mine = np.array([unit == other for other in measured.units])
         what = Family(unit).noun.replace("lengths", "measured lengths")

@@ -10,6 +10,7 @@ a likelihood ratio between two hypotheses): no threshold has to be tuned.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -21,8 +22,9 @@ from pkmcal.measurements.measurements import Measurements
 from pkmcal.statistics.linear_fit import column_basis, numbered
 
 _CHANCE = 1e-4  # of a wrong reading that is as much more likely, all those that are tried together
-_SMALLER = 0.85  # of the residuals: a model that is slightly wrong gains less from a wrong reading
+_SMALLER = 0.92  # of the residuals: a model that is slightly wrong gains less from a wrong reading
 _MOST = 4000  # equations that are compared
+_TIMES = 3  # that weights are found anew
 
 
 @dataclass(frozen=True)
@@ -44,30 +46,65 @@ class Likelier:
     residual: float
 
 
+@dataclass(frozen=True, eq=False)
 class _Compared:
-    """The equations that are compared, and what a linear fit to readings of them leaves."""
+    """The equations that are compared.
 
-    def __init__(self, found: Solution) -> None:
+    Attributes
+    ----------
+    found : Solution
+        The calibration.
+    use, group : ndarray of int (m,)
+        Which equations, and which family of which set each is of.
+    design : ndarray (m, p)
+        Theirs.
+    """
+
+    found: Solution
+    use: IntArray
+    group: IntArray
+    design: FloatArray
+
+    @classmethod
+    def of(cls, found: Solution) -> _Compared:
         sure = found.fit.uncertainty
         odd = np.isin(sure.equations.table.rows, found.outliers)[sure.labels.row]
         use = np.flatnonzero(~odd)
-        self.use: IntArray = use[:: max(1, -(-len(use) // _MOST))]
-        self.found = found
-        self.basis = column_basis(sure.fit.design[self.use])
-        of_set, family = sure.labels.set_of[self.use], sure.labels.family[self.use]
-        self.group = numbered(of_set, family)
+        use = use[:: max(1, -(-len(use) // _MOST))]
+        group = numbered(sure.labels.set_of[use], sure.labels.family[use])
+        return cls(found, use, group, sure.fit.design[use])
 
-    def log_likelihood(self, i: int, values: FloatArray) -> float:
-        """Of the readings of all sets, where those of set `i` are `values`; up to a constant."""
+    @cached_property
+    def basis(self) -> FloatArray:
+        return column_basis(self.design)
+
+    def residual(self, i: int, reading: Measurements) -> FloatArray:
+        """Of these equations (m,), where set `i` reads so and the others as given."""
         sure, end = self.found.fit.uncertainty, self.found.fit.end
-        predicted = end.predicted[i]
         parts = list(end.residuals)
-        parts[i] = sure.equations.table.sets[i].instrument.difference(values, predicted)
-        residual = sure.equations.whitening.whitened(parts, sure.factors)[self.use]
-        residual -= self.basis @ (self.basis.T @ residual)
-        squares = np.bincount(self.group, residual**2)
+        parts[i] = reading.instrument.difference(reading.values, end.predicted[i])
+        return sure.equations.whitening.whitened(parts, sure.factors)[self.use]
+
+    def at_once(self, residual: FloatArray) -> float:
+        """Logarithm of the likelihood after a linear fit with the weights that there are."""
+        return self._likelihood(residual - self.basis @ (self.basis.T @ residual))[0]
+
+    def refined(self, residual: FloatArray) -> float:
+        """After one with weights by the residuals of each group."""
+        left = residual - self.basis @ (self.basis.T @ residual)
+        likelihood, deviation = self._likelihood(left)
+        for _ in range(_TIMES):
+            basis = column_basis(self.design / deviation[:, None])
+            scaled = residual / deviation
+            left = (scaled - basis @ (basis.T @ scaled)) * deviation
+            likelihood, deviation = self._likelihood(left)
+        return likelihood
+
+    def _likelihood(self, left: FloatArray) -> tuple[float, FloatArray]:
+        """Its logarithm, up to a constant, and the deviation (m,) of each equation's group."""
         count = np.bincount(self.group)
-        return float(-0.5 * (count * np.log(np.maximum(squares / count, 1e-300))).sum())
+        variance = np.maximum(np.bincount(self.group, left**2) / count, 1e-300)
+        return float(-0.5 * (count * np.log(variance)).sum()), np.sqrt(variance)[self.group]
 
 
 def likelier_reading(found: Solution) -> Likelier | None:
@@ -75,23 +112,25 @@ def likelier_reading(found: Solution) -> Likelier | None:
     sure = found.fit.uncertainty
     if sure.mixed or sure.rounded or not sure.equations.whitening.any_read:
         return None
-    compared = _Compared(found)
+    compared = _Compared.of(found)
     count = len(compared.use)
-    if count <= compared.basis.shape[1]:
+    if count <= compared.design.shape[1]:
         return None
-    gains = {
-        (i, words): compared.log_likelihood(i, other.values) + _volume(given, other)
-        for i, given in enumerate(sure.equations.table.sets)
+    sets = sure.equations.table.sets
+    trials = {
+        (i, words): compared.at_once(compared.residual(i, other)) + _volume(given, other)
+        for i, given in enumerate(sets)
         if given.components
         for words, other in other_values(given)
     }
-    if not gains:
+    if not trials:
         return None
-    given = compared.log_likelihood(0, sure.equations.table.sets[0].values)
-    i, words = max(gains, key=lambda each: gains[each])
-    gain = gains[i, words] - given
+    i, words = max(trials, key=lambda each: trials[each])
+    best = dict(other_values(sets[i]))[words]
+    gain = compared.refined(compared.residual(i, best)) + _volume(sets[i], best)
+    gain -= compared.refined(compared.residual(i, sets[i]))
     share = float(np.exp(-gain / count))
-    if not gain > np.log(len(gains) / _CHANCE) or share > _SMALLER:
+    if not gain > np.log(len(trials) / _CHANCE) or share > _SMALLER:
         return None
     return Likelier(i, words, share)
 
