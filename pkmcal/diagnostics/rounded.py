@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +11,7 @@ from pkmcal.arrays import FloatArray, lots
 from pkmcal.diagnostics.check import Check, Level, Remedy
 from pkmcal.display import displayed
 from pkmcal.estimation.coarse_readings import DITHERED, Coarse
+from pkmcal.estimation.cut_readings import Cut
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.misfits import rounding_of
 from pkmcal.fitted.row_names import row_names
@@ -155,6 +156,50 @@ def _steps_text(found: Solution, seen: CoarseSteps) -> str:
     return f"{what} below the {floor} of rounding alone, which ± allow for"
 
 
+# steps that were cut ------------------------------------------------------------------------------
+
+
+def _cut(found: Solution) -> Iterator[Cut]:
+    """Readings that were cut; those of which it cannot be told, where that matters."""
+    sure = found.fit.uncertainty
+    seen = [each for each in sure.cut if each.seen]
+    if seen or not sure.known:
+        yield from (max(each, key=lambda cut: cut.size / cut.deviation) for each in _by_set(seen))
+        return
+    noise = np.diagonal(sure.covariance.of(sure.reported))
+    for several in _by_set([each for each in sure.cut if not each.refuted]):
+        offsets = np.array([sure.reported @ each.error for each in several])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            wider = np.sqrt(1.0 + (offsets**2).sum(axis=0) / noise)
+        if np.nanmax(np.where(noise > 0.0, wider, np.nan), initial=0.0) > _WIDER:
+            yield several[0]
+
+
+def _by_set(several: Sequence[Cut]) -> list[list[Cut]]:
+    return [
+        [each for each in several if each.set == i]
+        for i in dict.fromkeys(each.set for each in several)
+    ]
+
+
+def _cut_text(found: Solution, cut: Cut) -> str:
+    m = found.fit.equations.table.sets[cut.set]
+    named = [
+        (m.components[each.component], m.units[each.component], each) for each in cut.components
+    ]
+    what = ", ".join(f"{name} ({_shown(each.step, unit)[1]})" for name, unit, each in named)
+    if not cut.seen:
+        return (
+            f"whether readings in steps, {what}, were rounded or cut cannot be told from them: ±"
+            " allow for half a step in all rows alike"
+        )
+    way = "towards zero" if cut.to_zero else "to the step below"
+    return (
+        f"readings in steps, {what}, are as if cut {way}, not rounded: they are off by"
+        f" {cut.size:.2g} ± {cut.deviation:.1g} half steps; add half a step to what was cut"
+    )
+
+
 # readings at a stop -------------------------------------------------------------------------------
 
 
@@ -222,6 +267,11 @@ CHECKS = (
         about="residuals are smaller than the steps in which was read hide",
         unless=("nothing-measured",), levels=("doubt", "remark"), run=_coarse_steps,
         level_of=_level_of_steps, say=_steps_text,
+    ),
+    Check(
+        name="cut-readings", about="readings in steps were cut, not rounded; or nothing tells it",
+        unless=("nothing-measured",), levels=("doubt", "remark"), run=_cut,
+        level_of=lambda found, cut: "doubt" if cut.seen else "remark", say=_cut_text,
     ),
     Check(
         name="at-stop", about="many readings equal the largest or the smallest one", run=_at_stop,
