@@ -8,17 +8,16 @@ the same amount; under ``consider`` they are not fitted along.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
-from typing import Any
+from typing import Any, Protocol
 
 from pkmcal.arguments import number, shown
 from pkmcal.arrays import Unit
 from pkmcal.core.library import POSE
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.files.toml_table import Table
-from pkmcal.geometry.geometry import Geometry
 
 COMMON, CONSIDER, SCALE = "common", "consider", "scale"
 LEAST, MOST = 1e-15, 1e15  # mm, rad or 1, of what a standard deviation may be
@@ -155,7 +154,19 @@ def unit_of(pattern: str, names: Mapping[str, str]) -> str:
     return "mm"
 
 
-def read_uncertainty(table: Table, geometry: Geometry) -> StatedUncertainty:
+class _Named(Protocol):
+    """Numbers that a statement may be about, of a parallel machine or an arm."""
+
+    @property
+    def names(self) -> Sequence[str]: ...
+
+    @property
+    def units(self) -> Sequence[str]: ...
+
+    def match(self, patterns: str, /) -> list[str]: ...
+
+
+def read_uncertainty(table: Table, geometry: _Named) -> StatedUncertainty:
     """The table ``[uncertainty]`` of a robot file, in mm and rad."""
     units = dict(zip(geometry.names, geometry.units, strict=True))
     parts = {
