@@ -66,6 +66,8 @@ class SerialArm(SerialChain, Result):
     laws : JointLaws, optional
         What its joints add to their commands: sag, gears, coupled axes. Files and
         `identify(effects=…)` give them.
+    uncertainty : mapping of str to float, optional
+        How wrong numbers may be that a calibration does not look for, as `identify` takes it.
 
     Raises
     ------
@@ -205,6 +207,7 @@ class SerialArm(SerialChain, Result):
             name=self.name,
             joint_names=self.joint_names,
             laws=self.laws,
+            uncertainty=self.uncertainty.table(),
         )
 
     @property
