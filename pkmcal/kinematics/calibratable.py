@@ -16,6 +16,7 @@ from pkmcal.arms.inputs import ERRORS
 from pkmcal.arrays import BoolArray, FloatArray, Int32Array, as_rows
 from pkmcal.core import screws
 from pkmcal.exceptions import ArgumentError
+from pkmcal.geometry.carried import Load
 from pkmcal.geometry.stated_uncertainty import NOTHING, StatedUncertainty
 from pkmcal.kinematics.robot import Robot
 
@@ -221,6 +222,10 @@ class ArmMachine:
     def approaching(self, approach: FloatArray) -> ArmMachine:
         """With joints that come from there (N, n)."""
         return ArmMachine(self.arm.approaching(approach))
+
+    def under(self, load: Load) -> ArmMachine:
+        """With what the tool carries, one for all rows or one each."""
+        return ArmMachine(self.arm.under(load))
 
     def with_values(self, values: FloatArray) -> ArmMachine:
         """The same as `replace`, which is quick here."""
