@@ -18,7 +18,6 @@ from pkmcal.fitted.solution import Solution
 from pkmcal.geometry.carried import Load
 from pkmcal.geometry.elastic import COMPLIANCE
 from pkmcal.kinematics.calibratable import ArmMachine, Calibratable
-from pkmcal.kinematics.robot import Robot
 from pkmcal.statistics.score_test import score_test
 
 CHANCE = 0.01  # below which residuals follow the loads
@@ -40,7 +39,7 @@ class IgnoredLoads(NamedTuple):
 
 def _ignored(found: Solution) -> tuple[IgnoredLoads, ...]:
     fit, robot = found.fit, found.fit.parameters.robot
-    if _yields(robot):
+    if robot.yields:
         return ()
     if not any(m.load is not None and m.load.any() for m in fit.equations.table.sets):
         return ()
@@ -51,13 +50,6 @@ def _ignored(found: Solution) -> tuple[IgnoredLoads, ...]:
         score = score_test(sure.fit, _by_compliances(fit, robot))
         return (IgnoredLoads(float("nan") if score is None else score.chance),)
     return (IgnoredLoads(float("nan")),)
-
-
-def _yields(robot: Calibratable) -> bool:
-    """Whether something of it follows loads."""
-    if isinstance(robot, ArmMachine):
-        return robot.arm.joint_laws.yielding
-    return isinstance(robot, Robot) and robot.model.elastic is not None
 
 
 def _of_loads(robot: Calibratable) -> Elasticity:

@@ -112,6 +112,10 @@ class Calibratable(Protocol):
     def model(self) -> FreeByDefault:
         """What its file declares."""
 
+    @property
+    def yields(self) -> bool:
+        """Whether something of it follows what it carries."""
+
     def replace(self, changes: FloatArray) -> Calibratable:
         """A machine with other numbers (p,), checked as those of a file are."""
 
@@ -210,6 +214,11 @@ class ArmMachine:
             values = np.concatenate([values, arm.laws.values])
         self.geometry = ArmGeometry(names, units, values)
         self.home = screws.pose(arm.home.reshape(1, 16))[0]
+
+    @property
+    def yields(self) -> bool:
+        """Whether a joint follows what the tool carries."""
+        return self.arm.laws is not None and self.arm.laws.yielding
 
     def replace(self, changes: FloatArray) -> ArmMachine:
         """With other joint errors (6 n,) and numbers of its joints' laws, mm and rad."""

@@ -43,13 +43,6 @@ class DriveState(NamedTuple):
             found = found.approaching(self.approach)
         if isinstance(found, Robot) and self.tension is not None:
             found = found.tensioned(self.tension)
-        if self.load is not None and _yields(found):
+        if isinstance(found, Robot | ArmMachine) and self.load is not None and found.yields:
             found = found.under(Load.of_rows(self.load))
         return cast(M, found)
-
-
-def _yields(machine: Any) -> bool:
-    """Whether something of it may follow a load."""
-    if isinstance(machine, ArmMachine):
-        return machine.arm.laws is not None
-    return isinstance(machine, Robot) and machine.rigid is not machine
