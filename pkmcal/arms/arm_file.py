@@ -80,7 +80,7 @@ def write(arm: ArmArguments, path: str | os.PathLike[str], comment: str = "") ->
     head: dict[str, Any] = {"name": arm["name"], "units": {"length": "mm", "angle": "rad"}}
     laws = arm["laws"]
     if laws is not None:
-        head["gravity"] = list(laws.gravity)
+        head["gravity"] = list(laws.pulls.gravity)
     blocks = [HEADER, lines(head), "[tool]\n" + lines({"home": arm["home"][:3].tolist()})]
     if arm["uncertainty"]:
         blocks.append("[uncertainty]\n" + lines(arm["uncertainty"]))

@@ -23,7 +23,7 @@ from pkmcal.arms.inputs import (
 )
 from pkmcal.arms.inverse import ArmInverse, Part, damped_least_squares
 from pkmcal.arms.joint_laws import JointLaws
-from pkmcal.arrays import FloatArray, Unit, as_rows
+from pkmcal.arrays import FloatArray, IntArray, Unit, as_rows
 from pkmcal.core.screws import Arm, Links
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.stated_uncertainty import StatedUncertainty, Uncertain, stated_uncertainty
@@ -319,6 +319,15 @@ class SerialChain:
             A wrong shape, no numbers, or no rigid motions.
         """
         return damped_least_squares(self, target, guess, joint_errors, parts)
+
+    def of_rows(self, rows: IntArray) -> SerialChain:
+        """The chain with joints in the state that they have in some rows of a call."""
+        laws = None if self._laws is None else self._laws.of_rows(rows)
+        if laws is self._laws:
+            return self
+        changed = self.arguments
+        changed["laws"] = laws
+        return SerialChain(**changed)
 
     # --------------------------------------------------------------------------------------------
 

@@ -13,7 +13,6 @@ from pkmcal.calibration.asked import (
     EARLIER,
     ErrorWord,
     Unknown,
-    effects_on,
     fixed_names,
     loss_and_rule,
     now,
@@ -34,6 +33,7 @@ from pkmcal.calibration.steps import (
 from pkmcal.diagnostics.row_errors import likely_mistakes
 from pkmcal.diagnostics.sag import sag_that_helps
 from pkmcal.effects.effect import Effects
+from pkmcal.effects.stated import effects_on
 from pkmcal.estimation.datasets import as_fit_data, by_set
 from pkmcal.estimation.free_parameters import parameters
 from pkmcal.estimation.held_coefficients import coefficients, of_the_machine, with_held

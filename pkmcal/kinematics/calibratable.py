@@ -14,6 +14,7 @@ from pkmcal.arms.arm import SerialArm
 from pkmcal.arms.arm_geometry import arm_geometry
 from pkmcal.arrays import BoolArray, FloatArray, Int32Array, as_rows
 from pkmcal.core import screws
+from pkmcal.geometry.carried import Load
 from pkmcal.geometry.stated_uncertainty import NOTHING, StatedUncertainty
 from pkmcal.kinematics.robot import Robot
 
@@ -109,6 +110,10 @@ class Calibratable(Protocol):
     def model(self) -> FreeByDefault:
         """What its file declares."""
 
+    @property
+    def yields(self) -> bool:
+        """Whether something of it follows what it carries."""
+
     def replace(self, changes: FloatArray) -> Calibratable:
         """A machine with other numbers (p,), checked as those of a file are."""
 
@@ -167,6 +172,11 @@ class ArmMachine:
         self.model = ArmModel(self.geometry.names[: 6 * arm.n_joints], arm.uncertainty)
         self.home = screws.pose(arm.home.reshape(1, 16))[0]
 
+    @property
+    def yields(self) -> bool:
+        """Whether a joint follows what the tool carries."""
+        return self.arm.laws is not None and self.arm.laws.yielding
+
     def replace(self, changes: FloatArray) -> ArmMachine:
         """With other joint errors (6 n,) and numbers of its joints' laws, mm and rad."""
         of_joints = 6 * self.n_actuators
@@ -178,6 +188,10 @@ class ArmMachine:
     def approaching(self, approach: FloatArray) -> ArmMachine:
         """With joints that come from there (N, n)."""
         return ArmMachine(self.arm.approaching(approach))
+
+    def under(self, load: Load) -> ArmMachine:
+        """With what the tool carries, one for all rows or one each."""
+        return ArmMachine(self.arm.under(load))
 
     def with_values(self, values: FloatArray) -> ArmMachine:
         """The same as `replace`, which is quick here."""

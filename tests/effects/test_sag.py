@@ -13,6 +13,7 @@ import pytest
 
 import pkmcal as pk
 from pkmcal.arms.joint_laws import JointLaws, Term
+from pkmcal.arms.joint_pulls import JointPulls
 from pkmcal.arms.weights import at_rest, gravity_torques
 from pkmcal.arrays import FloatArray
 from pkmcal.calibration.rigid import rigid_arm
@@ -181,7 +182,7 @@ def test_outliers_of_a_rigid_arm_that_sags_are_none() -> None:
 def test_tied_compliances_are_found_and_tell_another_payload() -> None:
     """With masses known, the springs themselves are found."""
     true = built(7)
-    weighed = JointLaws(ARM.axes, ARM.points, ARM.kinds, {}, masses=MASSES, centres=CENTRES)
+    weighed = JointLaws(JointPulls(ARM.axes, ARM.points, ARM.kinds, masses=MASSES, centres=CENTRES))
     arm = ARM.with_laws(weighed)
     m = measured(commands(60, 50), true, 51, SOFT)
     found = pk.identify(arm, m, effects=[pk.Sag((2, 3, 5), tied=True)], **UNKNOWN)
@@ -190,6 +191,42 @@ def test_tied_compliances_are_found_and_tell_another_payload() -> None:
     sigma = np.array([found.parameters[name]["stderr"] for name in names])
     assert (np.abs(values - SOFT[[1, 2, 4]]) < 4 * sigma + 0.05 * SOFT[[1, 2, 4]]).all()
     assert (sigma < 0.2 * SOFT[[1, 2, 4]]).all()
+
+
+def carried(kg: FloatArray, seed: int, true: pk.SerialArm) -> pk.Measurements:
+    """One target under payloads by row, of joints with springs that carry links and payload."""
+    theta = np.tile(commands(len(kg) // 2, seed), (2, 1))
+    at = np.array([450.0, 0.0, 670.0])
+    total = MASSES[5] + kg
+    centre = (MASSES[5] * CENTRES[5] + kg[:, None] * at) / total[:, None]
+    rest = np.empty_like(theta)
+    for i in range(len(kg)):
+        masses, centres = np.append(MASSES[:5], total[i]), np.vstack([CENTRES[:5], centre[i]])
+        rest[i] = at_rest(
+            lambda q, m=masses, c=centres: gravity_torques(true, q, m, c), theta[i : i + 1], SOFT
+        )[0]
+    m = pk.VirtualMachine(true, NOISE, seed=seed).measure(rest, "position", TARGETS[0])
+    return replace(m, actuators=theta, load=pk.Load(kg, centre=(0, 0, 40)).rows(kg.shape))
+
+
+def test_compliances_of_joints_are_found_by_payloads_alone() -> None:
+    """No mass of a link is known: products take up their weight, and another payload is told."""
+    true, names = built(11), [f"compliance{i}" for i in range(2, 7)]
+    m = carried(np.repeat([0.0, 5.0], 40), 1, true)
+    found = pk.identify(ARM, m, effects=[pk.Sag("all"), pk.Elasticity("joint*")])
+    values = np.array([found.parameters[name]["value"] for name in names])
+    sigma = np.array([found.parameters[name]["stderr"] for name in names])
+    assert (np.abs(values - SOFT[1:]) < 4 * sigma + 0.01 * SOFT[1:]).all()
+    assert (sigma[:4] < 0.1 * SOFT[1:5]).all()
+    assert any("compliance1" in each for each in found.unidentifiable)  # nothing turns it
+    held = carried(np.repeat([2.5, 9.0], 20), 2, true)
+    again = pk.identify(ARM, m, effects=[pk.Sag("all"), pk.Elasticity("joint*")], holdout=held)
+    assert again.holdout_rms < 1.3 * np.sqrt(3) * NOISE
+    assert again.verdict.state == "calibrated"
+    alone = pk.identify(ARM, m, effects=[pk.Sag("all")], holdout=held)
+    assert alone.holdout_rms > 10 * again.holdout_rms
+    (said,) = [each for each in alone.verdict.reasons if "residuals follow the loads" in each]
+    assert "--effects 'elasticity=joint*'" in said
 
 
 def test_the_arm_without_laws_is_the_better_of_two() -> None:
