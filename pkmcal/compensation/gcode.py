@@ -144,6 +144,8 @@ class Program:
         for i, line in enumerate(lines):
             if line.endswith("\r") and self.dialect.newlines:
                 raise self.wrong(i, f"{self.dialect.title} ends no line at a carriage return alone")
+            if "\0" in line:
+                raise self.wrong(i, "has a zero byte, at which controllers end a line: no text")
             code = line.rstrip("\r\n")
             code = code.replace(MARK, " ", 1) if i == 0 else code
             marked = code.strip() == "%" if marked is None and code.strip() else marked
@@ -283,6 +285,8 @@ class Program:
             state.feed = Feed(feed.value * state.scale, feed.value)
         extrusion = self._extrusion(words.get("E"), state)
         if not axes:
+            if state.timed and command.name == "G1" and feed is None:
+                raise Unclear("as a joint move, G1 needs axis words or F: take it out")
             return []
         start, known = state.at, state.known.issuperset(self._letters)
         fresh = self._fresh(state)
