@@ -20,7 +20,7 @@ from pkmcal.fitted.left_out import effect_columns
 from pkmcal.geometry.stated_uncertainty import SCALE, StatedUncertainty
 from pkmcal.kinematics.calibratable import ArmMachine
 from pkmcal.readings.reading import Predicted
-from pkmcal.statistics.score_test import Columns, columns_of
+from pkmcal.statistics.score_test import Columns
 
 _LEAST_TRAVEL = 0.02  # of the machine's length, from which a place is more than an error
 _LEAST_WAY = 1e-9  # of the machine's length, below which actuators have not moved
@@ -209,10 +209,9 @@ def _of_gears(effect: Harmonics | Coupling) -> Callable[[Fit], Columns | None]:
         if not isinstance(machine, ArmMachine):
             return None
         try:
-            found = effect_columns(fit, [effect.of_machine(machine)])
+            return effect_columns(fit, [effect.of_machine(machine)])
         except ArgumentError:  # fewer joints than it has, or the fit has these numbers
             return None
-        return None if found is None else columns_of(found)
 
     return columns
 

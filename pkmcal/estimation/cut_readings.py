@@ -17,7 +17,7 @@ from pkmcal.estimation.coarse_readings import Coarse, component_of
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.labels import Labels
 from pkmcal.statistics.linear_fit import LinearFit
-from pkmcal.statistics.score_test import score_test
+from pkmcal.statistics.score_test import columns_of, score_test
 
 _CHANCE = 1e-4  # of as large an offset, were they rounded
 _HALF = 0.5  # of half a step, above which an offset is that of readings that were cut
@@ -95,7 +95,7 @@ def cut_readings(
             column = equations.whitening.whitened(parts, factors)
             used = (named.set_of == i) & np.isin(component, [each.component for each in mine])
             column[~used] = 0.0
-            score = score_test(fit, column[:, None])
+            score = score_test(fit, columns_of(column[:, None]))
             size, deviation, chance = (
                 (0.0, np.inf, 1.0)
                 if score is None

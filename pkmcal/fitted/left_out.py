@@ -20,6 +20,7 @@ from pkmcal.estimation.parameters import Parameters
 from pkmcal.fitted.fit import Fit
 from pkmcal.statistics.leave_out import leave_out
 from pkmcal.statistics.linear_fit import numbered
+from pkmcal.statistics.score_test import Columns, columns_of
 
 LEAST_GAIN = 0.05  # share of the rms at poses left out that an effect must take away
 LEAST_T = 2.0  # of the paired differences by pose
@@ -117,8 +118,8 @@ def compared_by_poses(
     return _comparison(lengths, beside, chosen, fit)
 
 
-def effect_columns(fit: Fit, effects: Sequence[Effect | Changed]) -> FloatArray | None:
-    """Derivative (M, k) of the whitened predicted values by numbers of effects that the fit lacks.
+def effect_columns(fit: Fit, effects: Sequence[Effect | Changed]) -> Columns | None:
+    """Derivative of the whitened predicted values by numbers of effects that the fit lacks.
 
     None where poses have unknowns, or the fit has these numbers.
     """
@@ -130,8 +131,7 @@ def effect_columns(fit: Fit, effects: Sequence[Effect | Changed]) -> FloatArray 
     new = [i for i, name in enumerate(chosen.names) if name not in fitted]
     if not new:
         return None
-    columns: FloatArray = equations.by_parameters(end, sure.factors)[:, new]
-    return columns
+    return columns_of(equations.by_parameters(end, sure.factors)[:, new])
 
 
 def _squares(fit: Fit, missed: FloatArray, pose: np.ndarray) -> FloatArray:

@@ -266,7 +266,7 @@ centre = [300, 0, 0]
     for wrong, message in (
         ("stiffness = -1.0", "stiffness: must be above 0"),
         ("stiffness = 2e4\ndrive = { compliance = 1e-8 }", "stiffness already"),
-        ("balancer = { base = [0, 0, 1], link = [0, 0, 2], rate = -1, free = 0 }", "rate: must not"),
+        ("balancer = {base = [0, 0, 1], link = [0, 0, 2], rate = -1, free = 0 }", "rate: must not"),
         ("balancer = { base = [0, 0, 1], link = [0, 0, 2] }", "rate"),
     ):
         (tmp_path / "wrong.toml").write_text(one + wrong)
