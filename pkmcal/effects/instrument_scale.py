@@ -39,8 +39,13 @@ class InstrumentScale:
         yield Dependence(SCALE, SCALE, given, {"": number}, every)
 
     def of_rows(self, measured: Measurements) -> ScaledRows:
-        """The effect in rows of one kind: distances count from their anchors."""
-        reads = "mm" in measured.units and measured.touched is None
+        """The effect in rows of one kind: distances count from their anchors.
+
+        Rows that all read the same were touched, whether they say so or not: the machine was driven
+        until the instrument read it, and its scale moves none of them.
+        """
+        touched = measured.touched is not None or not np.ptp(measured.values, axis=0).any()
+        reads = "mm" in measured.units and not touched
         return ScaledRows(reads, measured.instrument.point == "base")
 
 

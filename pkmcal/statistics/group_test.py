@@ -71,6 +71,8 @@ class FewEquations:
         mine : ndarray of bool (m,)
             Which of these equations are of the group, by whole cells.
         """
+        if mine.all() or not mine.any():
+            return None
         noise, freedoms = np.ones(len(mine)), []
         for group in (mine, ~mine):
             basis, values = column_basis(self.design[group]), self.residual[group]

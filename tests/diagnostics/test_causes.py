@@ -151,3 +151,20 @@ def test_regions_that_are_left_out_show_a_wrong_model():
             assert not wrong or regions.rms > regions.at_random
             said = any(each.check == "regions-left-out" for each in found.verdict.said)
             assert said == wrong
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_touches_of_one_height_have_no_scale(seed):
+    """A machine that was driven until it touched reads what it was driven to."""
+    random = np.random.default_rng(seed)
+    true = ROBOT.replace({f"offset{i}": 0.2 * random.normal() for i in range(1, 7)})
+    poses = pk.sample_poses(ROBOT, 60, seed=seed, share=0.4)
+    poses[:, 2] = ROBOT.home[2] + 0.01 * random.normal(size=60)
+    q = true.inverse(poses, match=True)
+    m = pk.Measurements(q, np.full(60, ROBOT.home[2]), "height")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        found = pk.identify(ROBOT, m, "offset*")
+    assert found.converged
+    assert not any("scale of the instrument" in str(each) for each in found.verdict.said)
+    assert "scale" not in {name for each, _ in possible(found.fit) for name in [each.name]}
