@@ -119,6 +119,18 @@ def test_rows_of_two_machines_are_told_apart(machine: Callable[..., Simulated], 
     assert group in doubts(robot, measured(q, mixed))["two-machines"].text
 
 
+@MACHINES
+@pytest.mark.parametrize("turn", ["random", "every third"])
+def test_rows_of_two_machines_in_no_order_that_is_known_are_told_apart(
+    machine: Callable[..., Simulated], turn: str
+) -> None:
+    rng = np.random.default_rng(6)
+    robot, q, true = machine(rng)
+    other = rng.random(COUNT) < 0.5 if turn == "random" else np.arange(COUNT) % 3 == 0
+    mixed = noisy(np.where(other[:, None], true(rng)(q), true(rng)(q)), rng)
+    assert "two-machines" in doubts(robot, measured(q, mixed))
+
+
 def test_two_files_of_two_machines_are_told_apart() -> None:
     rng = np.random.default_rng(3)
     robot, q, true = hexapod(rng)
