@@ -12,10 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, IntArray
+from pkmcal.diagnostics.reach import reach
 from pkmcal.diagnostics.visits import Visits, visits_of
 from pkmcal.display import chance_text, first_rows, printable
 from pkmcal.fitted.solution import Solution
-from pkmcal.statistics.group_test import few_equations, group_test
+from pkmcal.statistics.group_test import few_equations, group_test, within_reach
 from pkmcal.statistics.linear_fit import column_basis, numbered
 from pkmcal.statistics.two_regressions import best_division
 
@@ -90,7 +91,7 @@ def apart(found: Solution) -> Apart | None:
     cell = np.zeros(len(row), dtype=np.intp)
     for mine in groups.values():
         cell = numbered(cell, mine[row].astype(np.intp))
-    few = few_equations(sure.fit.design, sure.fit.residual, use, key, cell)
+    few = few_equations(sure.fit.design, sure.fit.residual, use, key, cell, reach(sure))
     first = np.unique(cell, return_index=True)[1]  # an equation of each cell
     tested = {name: few.tested(mine[row][first][few.cell]) for name, mine in groups.items()}
     known = {name: each for name, each in tested.items() if each is not None}
@@ -114,7 +115,7 @@ def _in_no_order(found: Solution, visits: Visits, use: IntArray, key: IntArray) 
     chosen = chosen[:: max(1, -(-len(chosen) // _MOST))]
     among = np.isin(visit[use], chosen)
     use, key = use[among], key[among]
-    few = few_equations(sure.fit.design, sure.fit.residual, use, key, visit)
+    few = few_equations(sure.fit.design, sure.fit.residual, use, key, visit, reach(sure))
     unit = numbered(few.cell)
     mine = best_division(few.design, few.residual, unit)
     width = few.design.shape[1]
@@ -122,7 +123,8 @@ def _in_no_order(found: Solution, visits: Visits, use: IntArray, key: IntArray) 
     share = mine[unit].mean()
     if min(share, 1.0 - share) * count < _OWN * width or mine.mean() < _SHARE:
         return None
-    tested = group_test(few.design, few.residual, mine[unit], count)
+    reached = within_reach(few.design, few.residual, mine[unit], few.reach)
+    tested = group_test(reached, few.residual, mine[unit], count)
     if tested is None or tested.apart > _FAR:
         return None
     chance = min(1.0, tested.chance * 2.0 ** (len(mine) - 1))
