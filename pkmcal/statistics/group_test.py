@@ -19,6 +19,7 @@ from pkmcal.statistics.singular_values import svd
 LEAST = 5  # degrees of freedom beside both groups' parameters
 _LEAST_NOISE = 10  # degrees of freedom from which equations show a noise of their own
 _SOME = 1e-9  # of a column's length that is more than rounding
+_ONE_SIDED = 0.3  # of a column's length, below which one of the groups says little of it
 _NEW = 1e-3  # of a column's length that the common parameters must leave of it
 
 
@@ -75,6 +76,8 @@ class FewEquations:
         mine : ndarray of bool (m,)
             Which of these equations are of the group, by whole cells.
         """
+        if not mine.any() or mine.all():
+            return None
         reached = within_reach(self.design, self.residual, mine, self.reach)
         noise, freedoms = np.ones(len(mine)), []
         for group in (mine, ~mine):
@@ -175,7 +178,7 @@ def within_reach(
     _, along, sizes, ways = _own(common, residual, mine)
     told = sizes > _SOME
     apart = 2.0 * (along[told] / sizes[told]) * (reach @ turn @ ways[told].T)
-    near = np.linalg.norm(apart, axis=0) <= 1.0
+    near = (np.linalg.norm(apart, axis=0) <= 1.0) | (sizes[told] > _ONE_SIDED)
     return design if near.all() else common @ np.vstack([ways[told][near], ways[~told]]).T
 
 

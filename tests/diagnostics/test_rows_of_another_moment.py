@@ -139,3 +139,47 @@ def test_two_files_of_two_machines_are_told_apart() -> None:
         for rows, file in ((slice(0, 30), "one.csv"), (slice(30, 60), "other.csv"))
     ]
     assert ".csv" in doubts(robot, *halves)["two-machines"].text
+
+
+def tips(read: Read, q: np.ndarray) -> np.ndarray:
+    there = pk.screw.from_pose(read(q))
+    return there[:, :3, :3] @ TIP + there[:, :3, 3]
+
+
+def touching(read: Read, q: np.ndarray, sockets: np.ndarray) -> np.ndarray:
+    """Actuators near `q` (N, n) that hold the tip in sockets (N, 3), by Newton's method."""
+    step = 1e-4 * np.ptp(q, axis=0).max()
+    for _ in range(30):
+        slopes = [(tips(read, q + e) - tips(read, q - e)) / (2 * step) for e in step * np.eye(6)]
+        off = sockets - tips(read, q)
+        q = q + (np.linalg.pinv(np.stack(slopes, axis=-1)) @ off[..., None])[..., 0]
+    return q
+
+
+TIP = np.array([10.0, 0.0, 90.0])
+
+
+def turned(rng: np.random.Generator) -> Simulated:
+    """Six cranks: as an arm, of a size that its angles do not show."""
+    robot = pk.load("6-rus")
+    q = robot.inverse(pk.sample_poses(robot, COUNT, seed=int(rng.integers(1000)), share=0.5))
+    return robot, q, lambda r: _poses(with_errors(robot, SIZE, r), 6)
+
+
+@pytest.mark.filterwarnings("ignore:.*determined to no better")
+@pytest.mark.parametrize("machine", [turned, arm])
+@pytest.mark.parametrize("deviation", [0.001, 0.5])
+def test_touches_of_two_sockets_are_not_those_of_two_machines(
+    machine: Callable[..., Simulated], deviation: float
+) -> None:
+    """Only their distance keeps the size of the machine, and touches of one do not know it."""
+    rng = np.random.default_rng(7)
+    robot, q, true = machine(rng)
+    read, second = true(rng), np.arange(COUNT) >= COUNT // 2
+    middle = tips(read, 0.5 * q[:1] + 0.5 * q.mean(axis=0))[0]
+    at = np.where(second[:, None], middle + [0.0, 50.0, 0.0], middle)
+    q = touching(read, q, at + 0.05 * rng.normal(size=at.shape))
+    touch = pk.readings.Touch(np.where(second, "B", "A"), distances={("A", "B"): (50.0, deviation)})
+    data = pk.Measurements(q, None, touch, target=TIP)
+    said = pk.identify(robot, data).verdict.said
+    assert not {"two-machines", "other-reading"} & {each.check for each in said}
