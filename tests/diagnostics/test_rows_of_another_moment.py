@@ -177,7 +177,7 @@ def test_touches_of_two_sockets_are_not_those_of_two_machines(
     robot, q, true = machine(rng)
     read, second = true(rng), np.arange(COUNT) >= COUNT // 2
     middle = tips(read, 0.5 * q[:1] + 0.5 * q.mean(axis=0))[0]
-    at = np.where(second[:, None], middle + [0.0, 50.0, 0.0], middle)
+    at = np.where(second[:, None], middle + np.array([0.0, 50.0, 0.0]), middle)
     q = touching(read, q, at + 0.05 * rng.normal(size=at.shape))
     touch = pk.readings.Touch(np.where(second, "B", "A"), distances={("A", "B"): (50.0, deviation)})
     data = pk.Measurements(q, None, touch, target=TIP)
