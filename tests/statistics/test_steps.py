@@ -53,11 +53,13 @@ def test_a_step_has_the_deviation_of_an_even_distribution() -> None:
     assert deviation(1.0) == pytest.approx(np.sqrt(np.mean(e**2)), rel=1e-9)
 
 
-@given(seeds, st.sampled_from([0.0, 0.01]))
-def test_clipped_readings_crowd_at_both_ends(seed: int, step: float) -> None:
+@given(seeds, st.sampled_from([0.0, 0.01]), st.integers(12, 25), st.integers(12, 25))
+def test_clipped_readings_crowd_at_both_ends(seed: int, step: float, low: int, high: int) -> None:
+    """A fifth of the readings or more at each end; the others anywhere between."""
     rng = np.random.default_rng(seed)
-    values = np.clip(rng.normal(size=60), -0.5, 0.5)
-    values = np.round(values / step) * step if step else values
+    values = np.repeat([-0.5, 0.5, 0.0], [low, high, 60 - low - high])
+    values[low + high :] = rng.uniform(-0.49, 0.49, 60 - low - high)
+    values = rng.permutation(np.round(values / step) * step if step else values)
     found = {round(value, 6): rows for value, rows in tied_extremes(values, np.arange(60), step)}
     assert set(found) == {-0.5, 0.5}
     assert (found[0.5] == (values == values.max())).all()
