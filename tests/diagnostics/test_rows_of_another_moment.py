@@ -183,3 +183,43 @@ def test_touches_of_two_sockets_are_not_those_of_two_machines(
     data = pk.Measurements(q, None, touch, target=TIP)
     said = pk.identify(robot, data).verdict.said
     assert not {"two-machines", "other-reading"} & {each.check for each in said}
+
+
+@MACHINES
+@pytest.mark.parametrize("jitter", [1e-4, 1e-7])
+def test_copies_with_other_digits_are_not_believed(
+    machine: Callable[..., Simulated], jitter: float
+) -> None:
+    rng = np.random.default_rng(8)
+    robot, q, true = machine(rng)
+    twice = np.tile(np.arange(COUNT // 2), 2)
+    q, read = q[twice], noisy(true(rng)(q[: COUNT // 2]), rng)[twice]
+    copied = slice(COUNT // 2, COUNT)
+    q[copied] += 0.1 * jitter * np.ptp(q) * rng.normal(size=(COUNT // 2, q.shape[1]))
+    read[copied] += jitter * rng.normal(size=(COUNT // 2, read.shape[1]))
+    assert "near-copies" in doubts(robot, measured(q, read))
+
+
+@MACHINES
+def test_poses_that_were_measured_twice_are_no_copies(machine: Callable[..., Simulated]) -> None:
+    """The drives do not come back to the last digit."""
+    rng = np.random.default_rng(9)
+    robot, q, true = machine(rng)
+    q = np.tile(q[: COUNT // 2], (2, 1)) + 1e-5 * np.ptp(q) * rng.normal(size=q.shape)
+    found = pk.identify(robot, measured(q, noisy(true(rng)(q), rng)))
+    assert "near-copies" not in {each.check for each in found.verdict.said}
+
+
+@MACHINES
+@pytest.mark.parametrize("digits", [2, 4])
+def test_nominal_poses_that_were_rounded_are_no_measurements(
+    machine: Callable[..., Simulated], digits: int
+) -> None:
+    """All angles of a pose are rounded, and each turns it about more than one axis."""
+    rng = np.random.default_rng(10)
+    robot, q, _ = machine(rng)
+    there = robot.forward(q)
+    exact = there.pose if isinstance(robot, pk.Robot) else pk.screw.to_pose(there)
+    read = np.round(exact[:, : 3 if machine is delta else 6], digits)
+    found = pk.identify(robot, measured(q, read), holdout=0.25)
+    assert "nothing-measured" in {each.check for each in found.verdict.said}
