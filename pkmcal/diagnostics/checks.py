@@ -10,6 +10,7 @@ from pkmcal.diagnostics import (
     held_out,
     loads,
     machine,
+    near_copies,
     noise,
     priors,
     refitted_readings,
@@ -25,8 +26,8 @@ from pkmcal.diagnostics.diagnosis import verified
 
 CHECKS = verified((
     *held_out.CHECKS, *units.CHECKS, *refitted_readings.CHECKS, *families.CHECKS,
-    *machine.CHECKS, *loads.CHECKS, *search.CHECKS, *rows.CHECKS, *rounded.CHECKS, *noise.CHECKS,
-    *priors.CHECKS, *course.CHECKS, *causes.CHECKS, *regions.CHECKS, *gain.CHECKS,
-    *sag.CHECKS, *waves.CHECKS,
+    *machine.CHECKS, *loads.CHECKS, *search.CHECKS, *rows.CHECKS, *near_copies.CHECKS,
+    *rounded.CHECKS, *noise.CHECKS, *priors.CHECKS, *course.CHECKS, *causes.CHECKS,
+    *regions.CHECKS, *gain.CHECKS, *sag.CHECKS, *waves.CHECKS,
 ))  # fmt: skip
 AT_ONCE = tuple(check for check in CHECKS if check.at_once)

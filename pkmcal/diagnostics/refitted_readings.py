@@ -17,9 +17,10 @@ import numpy as np
 from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.diagnostics.check import Check, at_most_one
 from pkmcal.diagnostics.other_readings import other_values
+from pkmcal.diagnostics.reach import reach
 from pkmcal.fitted.solution import Solution
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.statistics.linear_fit import column_basis, numbered
+from pkmcal.statistics.linear_fit import column_basis, numbered, orthonormal
 
 _CHANCE = 1e-4  # of a wrong reading that is as much more likely, all those that are tried together
 _SMALLER = 0.92  # of the residuals: a model that is slightly wrong gains less from a wrong reading
@@ -85,9 +86,22 @@ class _Compared:
         parts[i] = reading.instrument.difference(reading.values, end.predicted[i])
         return sure.equations.whitening.whitened(parts, sure.factors)[self.use]
 
+    @cached_property
+    def reach(self) -> FloatArray:
+        """How far numbers (n, r) go along the basis, of how far they can be off."""
+        sure = self.found.fit.uncertainty
+        changes: FloatArray = reach(sure) @ orthonormal(self.design)
+        return changes
+
     def at_once(self, residual: FloatArray) -> float:
-        """Logarithm of the likelihood after a linear fit with the weights that there are."""
-        return self._likelihood(residual - self.basis @ (self.basis.T @ residual))[0]
+        """Logarithm of the likelihood after a linear fit with the weights that there are.
+
+        −inf where no machine is so far off.
+        """
+        change = self.basis.T @ residual
+        if np.linalg.norm(self.reach @ change) > 1.0:
+            return -np.inf
+        return self._likelihood(residual - self.basis @ change)[0]
 
     def refined(self, residual: FloatArray) -> float:
         """After one with weights by the residuals of each group."""
@@ -126,6 +140,8 @@ def likelier_reading(found: Solution) -> Likelier | None:
     if not trials:
         return None
     i, words = max(trials, key=lambda each: trials[each])
+    if not np.isfinite(trials[i, words]):
+        return None
     best = dict(other_values(sets[i]))[words]
     gain = compared.refined(compared.residual(i, best)) + _volume(sets[i], best)
     gain -= compared.refined(compared.residual(i, sets[i]))

@@ -16,6 +16,7 @@ from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.misfits import rounding_of
 from pkmcal.fitted.row_names import row_names
 from pkmcal.fitted.solution import Solution
+from pkmcal.measurements.measurements import Measurements
 from pkmcal.statistics.distributions import chi2_tail
 from pkmcal.statistics.extremes import tied_extremes
 from pkmcal.statistics.steps import LEAST_ROWS, step_of
@@ -40,7 +41,7 @@ def _nothing_measured(found: Solution) -> tuple[str, ...]:
         residual = start.residuals[i]
         values = m.values.reshape(residual.shape)
         own = np.array([step_of(values[:, k], unit) for k, unit in enumerate(m.units)])
-        limit = 0.5 * own + reach[i] + _ROUNDED * rounding_of(m, start.robot.length)
+        limit = _half(m, own) + reach[i] + _ROUNDED * rounding_of(m, start.robot.length)
         off = np.stack(
             [_but_for_a_shift(*each) for each in zip(values.T, residual.T, strict=True)], axis=1
         )
@@ -48,6 +49,15 @@ def _nothing_measured(found: Solution) -> tuple[str, ...]:
             return ()
         steps += [_shown(step, unit) for step, unit in zip(own, m.units, strict=True) if step]
     return (max(steps, default=(0.0, ""))[1],)
+
+
+def _half(measured: Measurements, steps: FloatArray) -> FloatArray:
+    """How far rounding to steps (k,) moves each component (k,): of angles, all move a turn's."""
+    half = 0.5 * steps
+    for family in measured.instrument.families:
+        if family.unit == "rad":
+            half[list(family.columns)] = half[list(family.columns)].sum()
+    return half
 
 
 def _but_for_a_shift(values: FloatArray, residual: FloatArray) -> FloatArray:

@@ -1,4 +1,8 @@
-"""Whether some of the rows are of another machine: sets, sessions, halves, rows in turn."""
+"""Whether some of the rows are of another machine: sets, sessions, halves, rows in turn or in none.
+
+Of rows in no order the division that fits best is tested. Its chance is that of one division times
+the number of all, so that the search for it makes no false alarm where noise is Gaussian.
+"""
 
 from __future__ import annotations
 
@@ -7,15 +11,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray
+from pkmcal.arrays import BoolArray, FloatArray, IntArray
+from pkmcal.diagnostics.reach import reach
 from pkmcal.diagnostics.visits import Visits, visits_of
-from pkmcal.display import chance_text, printable
+from pkmcal.display import chance_text, first_rows, printable
 from pkmcal.fitted.solution import Solution
-from pkmcal.statistics.group_test import few_equations
+from pkmcal.statistics.group_test import few_equations, group_test, within_reach
 from pkmcal.statistics.linear_fit import column_basis, numbered
+from pkmcal.statistics.two_regressions import best_division
 
 CHANCE = 1e-3  # below which a group of rows is of another machine
 _LARGE = 0.8  # times the residuals, above which errors of a model may be as large
+_FAR = 0.7  # times the residuals, below which rows in no order are of another machine
+_MOST = 300  # visits of which such rows are looked for
+_OWN = 1.5  # equations for each parameter of such a group
+_SHARE = 0.15  # of the visits, that are no outliers
 _APART = 0.3  # of the variance of belonging to the group that the actuators explain
 
 
@@ -81,16 +91,48 @@ def apart(found: Solution) -> Apart | None:
     cell = np.zeros(len(row), dtype=np.intp)
     for mine in groups.values():
         cell = numbered(cell, mine[row].astype(np.intp))
-    few = few_equations(sure.fit.design, sure.fit.residual, use, key, cell)
+    few = few_equations(sure.fit.design, sure.fit.residual, use, key, cell, reach(sure))
     first = np.unique(cell, return_index=True)[1]  # an equation of each cell
     tested = {name: few.tested(mine[row][first][few.cell]) for name, mine in groups.items()}
     known = {name: each for name, each in tested.items() if each is not None}
-    if not known:
+    seen = None
+    if known:
+        name = min(known, key=lambda each: known[each].chance)
+        best = known[name]
+        chance = min(1.0, len(known) * best.chance)
+        seen = Apart(name, chance, best.apart, _elsewhere(found, groups[name]))
+        if seen.found and seen.large:
+            return seen
+    other = _in_no_order(found, visits, use, key)
+    return other if other is not None and other.found else seen
+
+
+def _in_no_order(found: Solution, visits: Visits, use: IntArray, key: IntArray) -> Apart | None:
+    """Test the division of the visits into two groups that fits best."""
+    sure = found.fit.uncertainty
+    visit = numbered(visits.series, visits.visit)[sure.labels.row]
+    chosen = np.unique(visit[use])
+    chosen = chosen[:: max(1, -(-len(chosen) // _MOST))]
+    among = np.isin(visit[use], chosen)
+    use, key = use[among], key[among]
+    few = few_equations(sure.fit.design, sure.fit.residual, use, key, visit, reach(sure))
+    unit = numbered(few.cell)
+    mine = best_division(few.design, few.residual, unit)
+    width = few.design.shape[1]
+    count = int(few.counts.sum())
+    share = mine[unit].mean()
+    if min(share, 1.0 - share) * count < _OWN * width or mine.mean() < _SHARE:
         return None
-    name = min(known, key=lambda each: known[each].chance)
-    best = known[name]
-    chance = min(1.0, len(known) * best.chance)
-    return Apart(name, chance, best.apart, _elsewhere(found, groups[name]))
+    reached = within_reach(few.design, few.residual, mine[unit], few.reach)
+    tested = group_test(reached, few.residual, mine[unit], count)
+    if tested is None or tested.apart > _FAR:
+        return None
+    chance = min(1.0, tested.chance * 2.0 ** (len(mine) - 1))
+    belongs = np.isin(visit, np.unique(visit[use])[mine])
+    rows = np.zeros(len(sure.equations.table.rows), dtype=bool)
+    rows[sure.labels.row[belongs]] = True
+    group = f"rows {first_rows(sure.equations.table.rows[rows].tolist(), 6)}"
+    return Apart(group, chance, tested.apart, _elsewhere(found, rows))
 
 
 def _elsewhere(found: Solution, mine: BoolArray) -> bool:

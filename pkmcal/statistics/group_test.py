@@ -13,11 +13,13 @@ import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.statistics.distributions import f_tail
-from pkmcal.statistics.linear_fit import column_basis, grouped, means, triangle
+from pkmcal.statistics.linear_fit import column_basis, grouped, means, orthonormal, triangle
 from pkmcal.statistics.singular_values import svd
 
 LEAST = 5  # degrees of freedom beside both groups' parameters
 _LEAST_NOISE = 10  # degrees of freedom from which equations show a noise of their own
+_SOME = 1e-9  # of a column's length that is more than rounding
+_ONE_SIDED = 0.3  # of a column's length, below which one of the groups says little of it
 _NEW = 1e-3  # of a column's length that the common parameters must leave of it
 
 
@@ -50,12 +52,15 @@ class FewEquations:
         Of each.
     counts : ndarray of int (cells,)
         For how many they stand, of each cell.
+    reach : ndarray (n, p)
+        Numbers of a machine by parameters, in units of what they may differ by at most.
     """
 
     design: FloatArray
     residual: FloatArray
     cell: IntArray
     counts: IntArray
+    reach: FloatArray
 
     def tested(self, mine: BoolArray) -> Groups | None:
         """Test a group against the others, each by the noise that it has beside own parameters.
@@ -64,26 +69,27 @@ class FewEquations:
         these miss of it is then its noise. The test is that of S. Johansen, The Welch-James
         approximation to the distribution of the residual sum of squares in a weighted linear
         regression, Biometrika 67 (1980). Where a group is too small to show its noise, both have
-        one, and the test is `group_test`.
+        one, and the test is `group_test`. Directions that `within_reach` leaves out are not tested.
 
         Parameters
         ----------
         mine : ndarray of bool (m,)
             Which of these equations are of the group, by whole cells.
         """
-        if mine.all() or not mine.any():
+        if not mine.any() or mine.all():
             return None
+        reached = within_reach(self.design, self.residual, mine, self.reach)
         noise, freedoms = np.ones(len(mine)), []
         for group in (mine, ~mine):
-            basis, values = column_basis(self.design[group]), self.residual[group]
+            basis, values = column_basis(reached[group]), self.residual[group]
             left = values - basis @ (basis.T @ values)
             squares = float(left @ left)
             freedom = int(self.counts[np.unique(self.cell[group])].sum()) - basis.shape[1]
             if freedom < _LEAST_NOISE or not squares > 0.0:
-                return group_test(self.design, self.residual, mine, int(self.counts.sum()))
+                return group_test(reached, self.residual, mine, int(self.counts.sum()))
             noise[group] = np.sqrt(squares / freedom)
             freedoms.append(freedom)
-        design, residual = self.design / noise[:, None], self.residual / noise
+        design, residual = reached / noise[:, None], self.residual / noise
         plain = group_test(design, residual, mine, int(self.counts.sum()))
         return None if plain is None else _by_own_noise(design, residual, mine, freedoms, plain)
 
@@ -106,7 +112,12 @@ def _by_own_noise(
 
 
 def few_equations(
-    design: FloatArray, residual: FloatArray, use: IntArray, key: IntArray, cell: IntArray
+    design: FloatArray,
+    residual: FloatArray,
+    use: IntArray,
+    key: IntArray,
+    cell: IntArray,
+    reach: FloatArray,
 ) -> FewEquations:
     """Average the equations that have the same key, and reduce each cell to its triangular factor.
 
@@ -120,6 +131,8 @@ def few_equations(
         Of each of these; those of one key are of one cell.
     cell : ndarray of int (M,)
         By number, from 0.
+    reach : ndarray (n, p)
+        See `FewEquations`.
     """
     width = design.shape[1] + 1
     factors: list[FloatArray] = [np.zeros((0, width)) for _ in range(int(cell.max()) + 1)]
@@ -133,7 +146,40 @@ def few_equations(
         for k in np.unique(cell_of):
             factors[k] = triangle(factors[k], averaged[cell_of == k])
     whole, number = np.concatenate(factors), np.arange(len(factors))
-    return FewEquations(whole[:, :-1], whole[:, -1], number.repeat([*map(len, factors)]), counts)
+    of_cell = number.repeat([*map(len, factors)])
+    return FewEquations(whole[:, :-1], whole[:, -1], of_cell, counts, reach)
+
+
+def within_reach(
+    design: FloatArray, residual: FloatArray, mine: BoolArray, reach: FloatArray
+) -> FloatArray:
+    """The design (M, k) without directions in which groups would differ more than machines do.
+
+    Where a direction changes the equations of a group by no more than their residuals, as touches
+    of one place change by the size of the machine, the group does not determine it: numbers of its
+    own then take its noise, whatever it is, with a machine that is shrunk to nothing.
+
+    Parameters
+    ----------
+    design, residual, mine
+        As of `group_test`.
+    reach : ndarray (n, p)
+        As of `FewEquations`.
+
+    Examples
+    --------
+    >>> design, far = np.array([[1.0, 0], [1, 0], [0, 1e3], [0, 1]]), np.diag([0.1, 0.1])
+    >>> mine = np.array([True, False, False, True])
+    >>> within_reach(design, np.array([1.0, -1, -0.1, 100]), mine, far).shape
+    (4, 1)
+    """
+    turn = orthonormal(design)
+    common = design @ turn
+    _, along, sizes, ways = _own(common, residual, mine)
+    told = sizes > _SOME
+    apart = 2.0 * (along[told] / sizes[told]) * (reach @ turn @ ways[told].T)
+    near = (np.linalg.norm(apart, axis=0) <= 1.0) | (sizes[told] > _ONE_SIDED)
+    return design if near.all() else common @ np.vstack([ways[told][near], ways[~told]]).T
 
 
 def group_test(
@@ -164,19 +210,33 @@ def group_test(
     if not mine.any() or mine.all():
         return None
     common = column_basis(design)
-    left = residual - common @ (common.T @ residual)
-    own = common * np.where(mine, 1.0, -1.0)[:, None]
-    own -= common @ (common.T @ own)
-    basis, sizes, _ = svd(own)
-    basis = basis[:, sizes > _NEW]
-    k = basis.shape[1]
+    left, along, sizes, _ = _own(common, residual, mine)
+    along = along[sizes > _NEW]
+    k = len(along)
     freedom = (len(residual) if count is None else count) - common.shape[1] - k
     if not k or freedom < LEAST:
         return None
-    along = basis.T @ left
     explained, whole = float(along @ along), float(left @ left)
     rest = (whole - explained) / freedom
     if not rest > 0.0:
         return None
     ratio = min(explained / k / rest, 1e300)
     return Groups(f_tail(ratio, k, freedom), float(np.sqrt(rest / (whole / (freedom + k)))))
+
+
+def _own(common: FloatArray, residual: FloatArray, mine: BoolArray) -> tuple[FloatArray, ...]:
+    """What numbers of its own explain for a group, beside the basis `common` (M, k).
+
+    Returns
+    -------
+    left : ndarray (M,)
+        Residuals that common numbers leave.
+    along : ndarray (k,)
+        These along an orthonormal basis of what is explained.
+    sizes, ways : ndarray (k,), (k, k)
+        Of the columns that it is the basis of, and their combinations in rows.
+    """
+    left = residual - common @ (common.T @ residual)
+    own = common * np.where(mine, 1.0, -1.0)[:, None]
+    basis, sizes, ways = svd(own - common @ (common.T @ own))
+    return left, basis.T @ left, sizes, ways

@@ -5,7 +5,8 @@ lowers the sum of squares most, as long as its score test says so (G. C. Chow, T
 between sets of coefficients in two linear regressions, Econometrica 28 (1960); tests by cluster as
 in `clusters`). Model errors shift parameters too, where the poses differ: shifts are therefore
 sought only if the first brings the later data nearer, and named only if they are a good part of the
-disagreement. Smaller ones are estimated along, for the sizes of those that are named lean on them.
+disagreement. Smaller ones are estimated along, for the sizes of those that are named lean on them;
+so are the others of their kind, whether or not they are found.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ _SHARE, _FALL = 0.05, 0.03  # … if it is so much of the disagreement, and the 
 _EQUAL = 1e-6  # share by which drops and chances differ that are not equal
 _ALIKE = 6.63  # drop in units of the variance by which candidates differ that can be told apart
 _FEW = 30  # equations up to which clusters are too few for their own variances
+_TOLD = 0.01  # share of the others of a kind that must be left of each, to be estimated along
 _SAME = 1e-6  # share of a candidate that must be left beside what is there
 
 
@@ -194,9 +196,16 @@ def _together(
     """Sizes and deviations of those named, estimated with all and with the common parameters."""
     if not taken:
         return []
-    columns = [raw[each.trial.candidate] for each in taken]
+    named = [each for each in taken if each.named]
+    columns = [raw[each.trial.candidate] for each in named]
     n = design.shape[1]
     whole = np.hstack([design, *columns])
+    if not few:
+        whole = np.hstack([whole, _beside(columns, raw, whole)])
+    for each in taken:
+        along = raw[each.trial.candidate]
+        if not each.named and _left(along, whole) > _SAME:  # else it is told by the others
+            whole = np.hstack([whole, along])
     _, singular, rows = svd(triangle(whole))
     keep = singular > ROUNDING * singular[0]
     half = rows[keep].T / singular[keep]
@@ -210,13 +219,41 @@ def _together(
         matrix = half @ Sandwich(fit).data @ half.T
     deviation = np.sqrt(np.maximum(np.diagonal(matrix), 0.0))
     found, start = [], n
-    for each, part in zip(taken, columns, strict=True):
+    for each, part in zip(named, columns, strict=True):
         mine, trial = slice(start, start + part.shape[1]), each.trial
         start = mine.stop
         size = solution[mine], deviation[mine]
-        if each.named:
-            found.append(Shift(trial.candidate, *size, trial.chance, each.also, each.rms))
+        found.append(Shift(trial.candidate, *size, trial.chance, each.also, each.rms))
     return found
+
+
+def _beside(
+    columns: Sequence[FloatArray], raw: Sequence[FloatArray], whole: FloatArray
+) -> FloatArray:
+    """What else shifts where several of a kind did: the others of a candidate of several.
+
+    Each may be too small to be found, or a shift of all alike is found in their place, beside which
+    one that is named has shifted by less than its own. Nothing where they cannot be told apart.
+    """
+    found = {column.tobytes() for each in columns for column in each.T}
+    others = {
+        column.tobytes(): column
+        for each in raw
+        if each.shape[1] > 1 and found & {column.tobytes() for column in each.T}
+        for column in each.T
+        if column.tobytes() not in found
+    }
+    if not others:
+        return whole[:, :0]
+    beside = np.column_stack(list(others.values()))
+    return beside if _left(beside, whole) > _TOLD else whole[:, :0]
+
+
+def _left(columns: FloatArray, whole: FloatArray) -> float:
+    """Share of columns that is left, beside others, of the combination that these take most of."""
+    common = column_basis(whole)
+    singular = svd(columns - common @ (common.T @ columns))[1]
+    return float(singular[-1]) / float(np.linalg.norm(columns))
 
 
 def _fit(design: FloatArray, residual: FloatArray, cluster: IntArray) -> LinearFit:

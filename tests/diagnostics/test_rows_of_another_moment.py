@@ -119,6 +119,18 @@ def test_rows_of_two_machines_are_told_apart(machine: Callable[..., Simulated], 
     assert group in doubts(robot, measured(q, mixed))["two-machines"].text
 
 
+@MACHINES
+@pytest.mark.parametrize("turn", ["random", "every third"])
+def test_rows_of_two_machines_in_no_order_that_is_known_are_told_apart(
+    machine: Callable[..., Simulated], turn: str
+) -> None:
+    rng = np.random.default_rng(6)
+    robot, q, true = machine(rng)
+    other = rng.random(COUNT) < 0.5 if turn == "random" else np.arange(COUNT) % 3 == 0
+    mixed = noisy(np.where(other[:, None], true(rng)(q), true(rng)(q)), rng)
+    assert "two-machines" in doubts(robot, measured(q, mixed))
+
+
 def test_two_files_of_two_machines_are_told_apart() -> None:
     rng = np.random.default_rng(3)
     robot, q, true = hexapod(rng)
@@ -127,3 +139,87 @@ def test_two_files_of_two_machines_are_told_apart() -> None:
         for rows, file in ((slice(0, 30), "one.csv"), (slice(30, 60), "other.csv"))
     ]
     assert ".csv" in doubts(robot, *halves)["two-machines"].text
+
+
+def tips(read: Read, q: np.ndarray) -> np.ndarray:
+    there = pk.screw.from_pose(read(q))
+    return there[:, :3, :3] @ TIP + there[:, :3, 3]
+
+
+def touching(read: Read, q: np.ndarray, sockets: np.ndarray) -> np.ndarray:
+    """Actuators near `q` (N, n) that hold the tip in sockets (N, 3), by Newton's method."""
+    step = 1e-4 * np.ptp(q, axis=0).max()
+    for _ in range(30):
+        slopes = [(tips(read, q + e) - tips(read, q - e)) / (2 * step) for e in step * np.eye(6)]
+        off = sockets - tips(read, q)
+        q = q + (np.linalg.pinv(np.stack(slopes, axis=-1)) @ off[..., None])[..., 0]
+    return q
+
+
+TIP = np.array([10.0, 0.0, 90.0])
+
+
+def turned(rng: np.random.Generator) -> Simulated:
+    """Six cranks: as an arm, of a size that its angles do not show."""
+    robot = pk.load("6-rus")
+    q = robot.inverse(pk.sample_poses(robot, COUNT, seed=int(rng.integers(1000)), share=0.5))
+    return robot, q, lambda r: _poses(with_errors(robot, SIZE, r), 6)
+
+
+@pytest.mark.filterwarnings("ignore:.*determined to no better")
+@pytest.mark.parametrize("machine", [turned, arm])
+@pytest.mark.parametrize("deviation", [0.001, 0.5])
+def test_touches_of_two_sockets_are_not_those_of_two_machines(
+    machine: Callable[..., Simulated], deviation: float
+) -> None:
+    """Only their distance keeps the size of the machine, and touches of one do not know it."""
+    rng = np.random.default_rng(7)
+    robot, q, true = machine(rng)
+    read, second = true(rng), np.arange(COUNT) >= COUNT // 2
+    middle = tips(read, 0.5 * q[:1] + 0.5 * q.mean(axis=0))[0]
+    at = np.where(second[:, None], middle + np.array([0.0, 50.0, 0.0]), middle)
+    q = touching(read, q, at + 0.05 * rng.normal(size=at.shape))
+    touch = pk.readings.Touch(np.where(second, "B", "A"), distances={("A", "B"): (50.0, deviation)})
+    data = pk.Measurements(q, None, touch, target=TIP)
+    said = pk.identify(robot, data).verdict.said
+    assert not {"two-machines", "other-reading"} & {each.check for each in said}
+
+
+@MACHINES
+@pytest.mark.parametrize("jitter", [1e-4, 1e-7])
+def test_copies_with_other_digits_are_not_believed(
+    machine: Callable[..., Simulated], jitter: float
+) -> None:
+    rng = np.random.default_rng(8)
+    robot, q, true = machine(rng)
+    twice = np.tile(np.arange(COUNT // 2), 2)
+    q, read = q[twice], noisy(true(rng)(q[: COUNT // 2]), rng)[twice]
+    copied = slice(COUNT // 2, COUNT)
+    q[copied] += 0.1 * jitter * np.ptp(q) * rng.normal(size=(COUNT // 2, q.shape[1]))
+    read[copied] += jitter * rng.normal(size=(COUNT // 2, read.shape[1]))
+    assert "near-copies" in doubts(robot, measured(q, read))
+
+
+@MACHINES
+def test_poses_that_were_measured_twice_are_no_copies(machine: Callable[..., Simulated]) -> None:
+    """The drives do not come back to the last digit."""
+    rng = np.random.default_rng(9)
+    robot, q, true = machine(rng)
+    q = np.tile(q[: COUNT // 2], (2, 1)) + 1e-5 * np.ptp(q) * rng.normal(size=q.shape)
+    found = pk.identify(robot, measured(q, noisy(true(rng)(q), rng)))
+    assert "near-copies" not in {each.check for each in found.verdict.said}
+
+
+@MACHINES
+@pytest.mark.parametrize("digits", [2, 4])
+def test_nominal_poses_that_were_rounded_are_no_measurements(
+    machine: Callable[..., Simulated], digits: int
+) -> None:
+    """All angles of a pose are rounded, and each turns it about more than one axis."""
+    rng = np.random.default_rng(10)
+    robot, q, _ = machine(rng)
+    there = robot.forward(q)
+    exact = there.pose if isinstance(robot, pk.Robot) else pk.screw.to_pose(there)
+    read = np.round(exact[:, : 3 if machine is delta else 6], digits)
+    found = pk.identify(robot, measured(q, read), holdout=0.25)
+    assert "nothing-measured" in {each.check for each in found.verdict.said}

@@ -78,16 +78,20 @@ def test_with_nominal_numbers_and_a_fitted_tip_sockets_scatter_by_7_to_9_mm(
     assert all(6.5 <= each <= 9.1 for each in scatter.values()), scatter
 
 
-@pytest.mark.parametrize(("fitted", "held"), [("AB", "CD"), ("CD", "AB")])
+@pytest.mark.parametrize(("fitted", "held", "doubts"), [("AB", "CD", ["causes"]), ("CD", "AB", [])])
 def test_one_placement_whose_sockets_are_50_mm_apart_calibrates_for_the_other(
-    arm: pk.SerialArm, rows: dict[str, FloatArray], fitted: str, held: str
+    arm: pk.SerialArm, rows: dict[str, FloatArray], fitted: str, held: str, doubts: list[str]
 ) -> None:
-    """The distance of the other is not known to the fit: an arm that had shrunk would show it."""
+    """The distance of the other is not known to the fit: an arm that had shrunk would show it.
+
+    One placement shows that the model misses something of the drives, as the other says: its tips
+    scatter three times as much there.
+    """
     found = pk.identify(arm, touches(rows, fitted, fitted), unknown="target")
     middle, scatter = judged(found, rows)
     distance = apart(middle, *held)
     print(f"{fitted}: {held} {distance:.3f} mm apart, scatter {scatter}")
-    assert found.verdict.state != "not calibrated"  # halves of the rows want other numbers
+    assert [said.check for said in found.verdict.said if said.level != "remark"] == doubts
     assert distance == pytest.approx(APART, abs=0.1)
     assert max(scatter[name] for name in held) < 0.6
     assert max(scatter[name] for name in fitted) < 0.2

@@ -81,3 +81,22 @@ def test_seven_heights_each_name_a_height_that_moved() -> None:
             else:
                 false += bool(found)
     assert false <= 4 and named > 80
+
+
+@pytest.mark.parametrize("name", ["hexapod", "arm"])
+def test_sizes_are_whole_where_others_of_a_kind_shifted_less(name: str) -> None:
+    """A common shift of all, found or not, is a part of what one of them shifted by."""
+    rng, off = np.random.default_rng(4), []
+    for _ in range(30):
+        true = np.zeros(33 if name == "arm" else 6)
+        true[:6] = rng.uniform(1.0, 3.0, 6)
+        true[0] = 30.0
+        first, later, axes = sessions(name, true, 0.0, rng)
+        kind = [axes[:, [k]] for k in range(6)]
+        together = [axes[:, :6].sum(axis=1, keepdims=True), axes[:, :6]]
+        found = shifted(first, later, axes, [*kind, *together])
+        off += [
+            (each.size[0] - true[0]) / each.deviation[0] for each in found if each.candidate == 0
+        ]
+    assert len(off) > 15
+    assert np.sqrt(np.mean(np.square(off))) < 1.5

@@ -14,6 +14,11 @@ from pkmcal.statistics.steps import deviation, step_of
 seeds = st.integers(0, 10_000)
 
 
+def near(x: np.ndarray) -> np.ndarray:
+    """Of no size: whatever parameters differ by is possible."""
+    return np.zeros((1, x.shape[1]))
+
+
 @given(
     seeds, st.sampled_from([5.0, 0.5, 0.1, 0.02, 1e-3]), st.sampled_from(["mm", "inch", "deg"]),
     st.floats(-50.0, 50.0),
@@ -48,11 +53,13 @@ def test_a_step_has_the_deviation_of_an_even_distribution() -> None:
     assert deviation(1.0) == pytest.approx(np.sqrt(np.mean(e**2)), rel=1e-9)
 
 
-@given(seeds, st.sampled_from([0.0, 0.01]))
-def test_clipped_readings_crowd_at_both_ends(seed: int, step: float) -> None:
+@given(seeds, st.sampled_from([0.0, 0.01]), st.integers(12, 25), st.integers(12, 25))
+def test_clipped_readings_crowd_at_both_ends(seed: int, step: float, low: int, high: int) -> None:
+    """A fifth of the readings or more at each end; the others anywhere between."""
     rng = np.random.default_rng(seed)
-    values = np.clip(rng.normal(size=60), -0.5, 0.5)
-    values = np.round(values / step) * step if step else values
+    values = np.repeat([-0.5, 0.5, 0.0], [low, high, 60 - low - high])
+    values[low + high :] = rng.uniform(-0.49, 0.49, 60 - low - high)
+    values = rng.permutation(np.round(values / step) * step if step else values)
     found = {round(value, 6): rows for value, rows in tied_extremes(values, np.arange(60), step)}
     assert set(found) == {-0.5, 0.5}
     assert (found[0.5] == (values == values.max())).all()
@@ -101,7 +108,7 @@ def test_few_equations_stand_for_the_averages_of_many() -> None:
     key, cell = key[order], cell[order]
     x, y = rng.normal(size=(len(key), 3)), rng.normal(size=len(key))
     y = y + 0.1 * cell * x[:, 0]
-    few = few_equations(x, y, np.arange(len(key)), key, cell)
+    few = few_equations(x, y, np.arange(len(key)), key, cell, near(x))
     assert len(few.design) == 8
     assert few.counts.tolist() == [len(np.unique(key[cell == k])) for k in (0, 1)]
     count = np.bincount(key)
@@ -121,7 +128,7 @@ def test_a_group_of_another_machine_is_told_whatever_its_weights() -> None:
     y = x @ rng.normal(size=6) * mine + 0.01 * rng.normal(size=60)
     weight = np.where(mine, 1.0, 100.0)
     x, y = x * weight[:, None], y * weight
-    few = few_equations(x, y, np.arange(60), np.arange(60), mine.astype(np.intp))
+    few = few_equations(x, y, np.arange(60), np.arange(60), mine.astype(np.intp), near(x))
     plain, tested = group_test(x, y, mine), few.tested(few.cell == 1)
     assert plain is not None and tested is not None
     assert tested.chance < 1e-16
@@ -138,7 +145,7 @@ def test_groups_of_unlike_noise_are_called_unlike_as_seldom(
     x, chances = rng.normal(size=(count, 4)), []
     for _ in range(600):
         y = rng.normal(size=count) * np.where(mine, louder, 1.0)
-        few = few_equations(x, y, np.arange(count), np.arange(count), mine.astype(np.intp))
+        few = few_equations(x, y, np.arange(count), np.arange(count), mine.astype(np.intp), near(x))
         chances.append(few.tested(few.cell == 1).chance)  # type: ignore[union-attr]
     assert np.mean(np.array(chances) < 0.05) < 0.09
     assert np.mean(np.array(chances) < 1e-3) < 0.006
