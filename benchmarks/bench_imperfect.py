@@ -10,6 +10,7 @@ unseen: those are listed in docs/believe.md.
 from __future__ import annotations
 
 import argparse
+import re
 import warnings
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
@@ -63,7 +64,7 @@ def judged(name: str, number: int) -> Draw:
         try:
             found = pk.identify(case.robot, case.data, case.free, **case.options)
         except (ValueError, TypeError) as error:
-            return Draw("refused", 0, 0, np.nan, False, (str(error)[:60],))
+            return Draw("refused", 0, 0, np.nan, False, (re.sub(r"[\d,]+ ?", "", str(error))[:40],))
         verdict = found.verdict
         true = numbers(case.true)
         truth = np.array([true.get(name, np.nan) for name in found.free])

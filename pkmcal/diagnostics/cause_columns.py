@@ -18,7 +18,7 @@ from pkmcal.fitted.fit import Fit
 from pkmcal.fitted.held_numbers import held_numbers
 from pkmcal.fitted.left_out import effect_columns
 from pkmcal.geometry.stated_uncertainty import SCALE, StatedUncertainty
-from pkmcal.kinematics.calibratable import ArmMachine
+from pkmcal.kinematics.calibratable import ArmMachine, Calibratable
 from pkmcal.readings.reading import Predicted
 from pkmcal.statistics.score_test import Columns
 
@@ -207,22 +207,20 @@ def _of_arm(fit: Fit) -> Iterator[Cause]:
 
     One by one, since a test of many numbers is weak where one of them is wrong.
     """
-    machine = fit.parameters.robot
-    if not isinstance(machine, ArmMachine):
-        return
-    for i in wave_joints(machine):
-        wave = Harmonics(1, joints=i)
-        name = f"an eccentric encoder or a tilted axis of joint {i}: a wave a turn"
+    waves = waves_a_turn(fit.parameters.robot)
+    for wave in waves:
+        name = f"an eccentric encoder or a tilted axis of joint {wave.joints}: a wave a turn"
         yield Cause(name, f"--effects {wave.option}", _of_effect(wave))
-    for joint, other in _WRIST:
+    for joint, other in _WRIST if waves else ():
         coupled = Coupling(((joint, other),))
         name = f"coupled joints of the wrist: joint {joint} turns along with joint {other}"
         yield Cause(name, f"--effects coupling={joint}.{other}", _of_effect(coupled))
 
 
-def wave_joints(machine: ArmMachine) -> list[int]:
-    """The joints of an arm that turn, counted from 1."""
-    return [i for i, kind in enumerate(machine.arm.kinds, 1) if kind == "revolute"]
+def waves_a_turn(machine: Calibratable) -> list[Harmonics]:
+    """A wave a turn of each joint of an arm that turns; none of another machine."""
+    kinds = machine.arm.kinds if isinstance(machine, ArmMachine) else ()
+    return [Harmonics(1, joints=i) for i, kind in enumerate(kinds, 1) if kind == "revolute"]
 
 
 def _of_effect(effect: Harmonics | Coupling) -> Callable[[Fit], Columns | None]:

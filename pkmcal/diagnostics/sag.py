@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from pkmcal.diagnostics.cause_columns import wave_joints
+from pkmcal.diagnostics.cause_columns import waves_a_turn
 from pkmcal.diagnostics.causes import HARMFUL, SURE
 from pkmcal.diagnostics.check import Check, Remedy, at_most_one
 from pkmcal.effects.effect import Changed
@@ -114,8 +114,9 @@ def _lacking(found: Solution) -> tuple[LackingSag, ...]:
 def _alike(fit: Fit, sag: Columns) -> Harmonics | None:
     """The wave a turn of one joint that explains all that sag does; None where none does."""
     machine = fit.parameters.robot
-    waves = [Harmonics(1, joints=i) for i in wave_joints(machine)]
-    by_wave = [(each, effect_columns(fit, [each.of_machine(machine)])) for each in waves]
+    by_wave = [
+        (each, effect_columns(fit, [each.of_machine(machine)])) for each in waves_a_turn(machine)
+    ]
     there = [(each, columns) for each, columns in by_wave if columns is not None]
     (best, *_) = causes(fit.uncertainty.fit, [sag, *(own for _, own in there)], SURE, 1) or (None,)
     if best is None or best.cause == 0 or 0 not in best.also:
