@@ -27,7 +27,10 @@ DRAWS, OF_SOUND = 40, 200
 LEAST_INSIDE, MOST_DOUBTED, LEAST_OF_SOUND = 0.90, 0.02, 0.93
 FEW_CALIBRATED = 0.1  # share of the draws below which a scenario counts as doubted
 PLACES = 150
-NAMED = ("sag", "waves", "two-machines", "measuring-order", "regions-left-out", "displaced-target")
+NAMED = (
+    "sag", "waves", "two-machines", "measuring-order", "regions-left-out", "displaced-target",
+    "holdout-nearer", "sigma-too-small",
+)  # fmt: skip
 
 
 class Draw(NamedTuple):
