@@ -10,6 +10,7 @@ unseen: those are listed in docs/believe.md.
 from __future__ import annotations
 
 import argparse
+import re
 import warnings
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
@@ -26,7 +27,10 @@ DRAWS, OF_SOUND = 40, 200
 LEAST_INSIDE, MOST_DOUBTED, LEAST_OF_SOUND = 0.90, 0.02, 0.93
 FEW_CALIBRATED = 0.1  # share of the draws below which a scenario counts as doubted
 PLACES = 150
-NAMED = ("sag", "waves", "two-machines", "measuring-order", "regions-left-out", "displaced-target")
+NAMED = (
+    "sag", "waves", "two-machines", "measuring-order", "regions-left-out", "displaced-target",
+    "holdout-nearer", "sigma-too-small",
+)  # fmt: skip
 
 
 class Draw(NamedTuple):
@@ -63,7 +67,7 @@ def judged(name: str, number: int) -> Draw:
         try:
             found = pk.identify(case.robot, case.data, case.free, **case.options)
         except (ValueError, TypeError) as error:
-            return Draw("refused", 0, 0, np.nan, False, (str(error)[:60],))
+            return Draw("refused", 0, 0, np.nan, False, (re.sub(r"[\d,]+ ?", "", str(error))[:40],))
         verdict = found.verdict
         true = numbers(case.true)
         truth = np.array([true.get(name, np.nan) for name in found.free])

@@ -6,6 +6,7 @@ verdict says of them was not known when they were written.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -70,6 +71,13 @@ def loose_joint(rng: np.random.Generator) -> Case:
     there = np.where(side > 0, near.forward(q, guess=there).pose, far.forward(q, guess=there).pose)
     read = there + rng.normal(size=there.shape) * [*[0.015] * 3, *[4e-5] * 3]
     return Case(robot, true, pk.Measurements(q, read, "pose"), ["base*", "platform*", "offset*"])
+
+
+@scenario("other")
+def loose_joint_noise_stated(rng: np.random.Generator) -> Case:
+    """The same, and the noise of the readings is stated."""
+    case = loose_joint(rng)
+    return replace(case, data=replace(case.data, sigma=[0.015] * 3 + [4e-5] * 3))
 
 
 @scenario("other")

@@ -18,11 +18,12 @@ from pkmcal.fitted.fit import Fit
 from pkmcal.fitted.held_numbers import held_numbers
 from pkmcal.fitted.left_out import effect_columns
 from pkmcal.geometry.stated_uncertainty import SCALE, StatedUncertainty
-from pkmcal.kinematics.calibratable import ArmMachine
+from pkmcal.kinematics.calibratable import ArmMachine, Calibratable
 from pkmcal.readings.reading import Predicted
 from pkmcal.statistics.score_test import Columns
 
 _LEAST_TRAVEL = 0.02  # of the machine's length, from which a place is more than an error
+_WRIST = ((5, 4), (6, 4), (6, 5))  # joints that gears couple, and those by which
 _LEAST_WAY = 1e-9  # of the machine's length, below which actuators have not moved
 
 
@@ -201,15 +202,33 @@ def _some(pattern: str, names: object) -> bool:
     return any(re.match(rf"{stem}\d", name) for name in names)  # type: ignore[attr-defined]
 
 
-def _of_gears(effect: Harmonics | Coupling) -> Callable[[Fit], Columns | None]:
+def _of_arm(fit: Fit) -> Iterator[Cause]:
+    """Causes of an arm: a wave a turn of each joint, and each coupling of its wrist.
+
+    One by one, since a test of many numbers is weak where one of them is wrong.
+    """
+    waves = waves_a_turn(fit.parameters.robot)
+    for wave in waves:
+        name = f"an eccentric encoder or a tilted axis of joint {wave.joints}: a wave a turn"
+        yield Cause(name, f"--effects {wave.option}", _of_effect(wave))
+    for joint, other in _WRIST if waves else ():
+        coupled = Coupling(((joint, other),))
+        name = f"coupled joints of the wrist: joint {joint} turns along with joint {other}"
+        yield Cause(name, f"--effects coupling={joint}.{other}", _of_effect(coupled))
+
+
+def waves_a_turn(machine: Calibratable) -> list[Harmonics]:
+    """A wave a turn of each joint of an arm that turns; none of another machine."""
+    kinds = machine.arm.kinds if isinstance(machine, ArmMachine) else ()
+    return [Harmonics(1, joints=i) for i, kind in enumerate(kinds, 1) if kind == "revolute"]
+
+
+def _of_effect(effect: Harmonics | Coupling) -> Callable[[Fit], Columns | None]:
     """Columns of an effect of an arm's gears."""
 
     def columns(fit: Fit) -> Columns | None:
-        machine = fit.parameters.robot
-        if not isinstance(machine, ArmMachine):
-            return None
         try:
-            return effect_columns(fit, [effect.of_machine(machine)])
+            return effect_columns(fit, [effect.of_machine(fit.parameters.robot)])
         except ArgumentError:  # fewer joints than it has, or the fit has these numbers
             return None
 
@@ -231,14 +250,6 @@ CAUSES = (
     Cause(
         "sag under the platform's weight", "state stiffness and mass, and find compliances", _sag
     ),
-    Cause(
-        "eccentric encoders or tilted joints: a wave a turn", "--effects harmonics=1",
-        _of_gears(Harmonics(1)),
-    ),
-    Cause(
-        "coupled joints of the wrist", "--effects coupling=5.4:6.4:6.5",
-        _of_gears(Coupling(((5, 4), (6, 4), (6, 5)))),
-    ),
     Cause("gains", "--free 'gain*' beside the others, or --uncertainty 'gain*=…'", _gains),
     Cause(
         "the scale of the instrument",
@@ -252,7 +263,7 @@ CAUSES = (
 
 def possible(fit: Fit) -> Iterator[tuple[Cause, Columns]]:
     """The causes that there may be in this fit, and their columns."""
-    for cause in CAUSES:
+    for cause in (*CAUSES, *_of_arm(fit)):
         columns = cause.columns(fit)
         if columns is not None:
             yield cause, columns

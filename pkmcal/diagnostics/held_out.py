@@ -18,13 +18,33 @@ from pkmcal.measurements.measurements import Measurements
 def _contradiction(found: Solution, several: tuple[HeldFamily, ...]) -> str:
     alone = len(found.holdout_families) == 1
     what = "points" if alone else " and ".join(each.family.noun for each in several)
+    chance = min(each.test.chance for each in several if each.test is not None)
+    return f"the held-out {what} contradict the fit: {_compared(several)} ({chance_text(chance)})"
+
+
+def _compared(several: tuple[HeldFamily, ...]) -> str:
+    """What came out of each family, and what is expected."""
     parts = []
     for each in several:
         off, unit = displayed(each.rms, each.family.unit)
         expected, _ = displayed(each.expected, each.family.unit)
         parts.append(f"{off:.3g} {unit} rms where {expected:.3g} {unit} is expected")
-    chance = min(each.test.chance for each in several if each.test is not None)
-    return f"the held-out {what} contradict the fit: {' and '.join(parts)} ({chance_text(chance)})"
+    return " and ".join(parts)
+
+
+def _nearer(found: Solution) -> tuple[tuple[HeldFamily, ...], ...]:
+    """The families that came out nearer than expected."""
+    several = tuple(each for each in found.holdout_families if each.test and each.test.nearer)
+    return at_most_one(several or None)
+
+
+def _nearer_text(found: Solution, several: tuple[HeldFamily, ...]) -> str:
+    chance = min(each.test.chance_nearer for each in several if each.test is not None)
+    return (
+        f"the held-out points are nearer than expected: {_compared(several)}"
+        f" ({chance_text(chance)}): the fitted rows have errors that these do not, of the model"
+        " where they are or of the instrument then"
+    )
 
 
 def _without_outliers(found: Solution) -> float:
@@ -118,6 +138,11 @@ CHECKS = (
         unless=("holdout-contradicts",), levels=("doubt", "remark"),
         run=lambda found: at_most_one(found.holdout_outliers or None), level_of=_level_of_few,
         say=_few_off, remedies=_drop,
+    ),
+    Check(
+        name="holdout-nearer",
+        about="held-out points are nearer than noise and covariance let expect",
+        levels=("remark",), run=_nearer, say=_nearer_text,
     ),
     Check(
         name="moved",

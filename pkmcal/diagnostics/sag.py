@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from pkmcal.diagnostics.cause_columns import waves_a_turn
 from pkmcal.diagnostics.causes import HARMFUL, SURE
 from pkmcal.diagnostics.check import Check, Remedy, at_most_one
 from pkmcal.effects.effect import Changed
+from pkmcal.effects.gears import Harmonics
 from pkmcal.effects.sag import Sag
 from pkmcal.exceptions import ArgumentError
 from pkmcal.fitted.fit import Fit
@@ -14,6 +16,7 @@ from pkmcal.fitted.left_out import Comparison, compared_by_poses, effect_columns
 from pkmcal.fitted.solution import Solution
 from pkmcal.kinematics.calibratable import ArmMachine, Calibratable
 from pkmcal.statistics.causes import causes
+from pkmcal.statistics.score_test import Columns
 
 NUMBERS = ("sag", "compliance")  # with which the names of sag begin
 
@@ -31,6 +34,28 @@ class SagFinding(NamedTuple):
 
     effect: Sag
     comparison: Comparison
+
+
+class LackingSag(NamedTuple):
+    """Sag that a fit lacks, what it does to the numbers, and what looks like it.
+
+    Attributes
+    ----------
+    effect : Sag
+        What would help.
+    comparison : Comparison
+        The poses left out.
+    shift : float
+        How far it moves the numbers, in their ±, rms.
+    wave : Harmonics or None
+        A wave a turn of one joint beside which sag explains nothing: an eccentric encoder makes the
+        wave that the weight of the joint's own link does.
+    """
+
+    effect: Sag
+    comparison: Comparison
+    shift: float
+    wave: Harmonics | None
 
 
 def sag_that_helps(fit: Fit) -> SagFinding | None:
@@ -74,15 +99,29 @@ def _of_sag(fit: Fit) -> list[str]:
     ]
 
 
-def _lacking(found: Solution) -> tuple[tuple[SagFinding, float], ...]:
+def _lacking(found: Solution) -> tuple[LackingSag, ...]:
     """What sag gains that the fit lacks, and how far it moves the numbers, in their ±."""
     helps = sag_that_helps(found.fit)
     if helps is None:
         return ()
-    changed = helps.effect.of_machine(found.fit.parameters.robot)
-    columns = effect_columns(found.fit, [changed])
+    machine = found.fit.parameters.robot
+    columns = effect_columns(found.fit, [helps.effect.of_machine(machine)])
     seen = [] if columns is None else causes(found.fit.uncertainty.fit, [columns], SURE, 1)
-    return ((helps, seen[0].shift if seen else 0.0),)
+    shift = seen[0].shift if seen else 0.0
+    return (LackingSag(*helps, shift, None if columns is None else _alike(found.fit, columns)),)
+
+
+def _alike(fit: Fit, sag: Columns) -> Harmonics | None:
+    """The wave a turn of one joint that explains all that sag does; None where none does."""
+    machine = fit.parameters.robot
+    by_wave = [
+        (each, effect_columns(fit, [each.of_machine(machine)])) for each in waves_a_turn(machine)
+    ]
+    there = [(each, columns) for each, columns in by_wave if columns is not None]
+    (best, *_) = causes(fit.uncertainty.fit, [sag, *(own for _, own in there)], SURE, 1) or (None,)
+    if best is None or best.cause == 0 or 0 not in best.also:
+        return None
+    return there[best.cause - 1][0]
 
 
 def _in_it(found: Solution) -> tuple[Comparison, ...]:
@@ -95,13 +134,21 @@ def _figures(gained: Comparison) -> str:
     return f"{gained} ({len(gained.numbers)} numbers, t {gained.t:.2g})"
 
 
-def _say_lacking(found: Solution, finding: tuple[SagFinding, float]) -> str:
-    (effect, gained), shift = finding
+def _say_lacking(found: Solution, lacking: LackingSag) -> str:
+    gained, wave = lacking.comparison, lacking.wave
     joints = sorted({name.partition(".")[0].removeprefix("sag") for name in gained.numbers})
-    harm = f", and the numbers move by {shift:.2g} of their ±" if shift > 0.5 else ""
+    harm = (
+        f", and the numbers move by {lacking.shift:.2g} of their ±" if lacking.shift > 0.5 else ""
+    )
+    also = (
+        f", or as well a wave a turn of joint {wave.joints}, as of an eccentric encoder or a tilted"
+        f" axis, with {Remedy('effects', (wave,))}"
+        if wave is not None
+        else ""
+    )
     return (
         f"residuals follow the torque of gravity on joints {', '.join(joints)}: {_figures(gained)}"
-        f" with {Remedy('effects', (effect,))}{harm}"
+        f" with {Remedy('effects', (lacking.effect,))}{also}{harm}"
     )
 
 
@@ -117,9 +164,9 @@ CHECKS = (
     Check(
         name="sag-lacking", about="joints of an arm yield under its weight, and nothing says so",
         levels=("doubt", "remark"),
-        level_of=lambda found, finding: "doubt" if finding[1] > HARMFUL else "remark",
+        level_of=lambda found, finding: "doubt" if finding.shift > HARMFUL else "remark",
         run=_lacking, say=_say_lacking,
-        remedies=lambda found, finding: (Remedy("effects", (finding[0].effect,)),),
+        remedies=lambda found, finding: (Remedy("effects", (finding.effect,)),),
     ),
     Check(
         name="sag", about="whether sag of an arm that was found helps",

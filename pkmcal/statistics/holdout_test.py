@@ -19,6 +19,7 @@ from pkmcal.statistics.noise import Noise
 
 CHANCE = 0.01  # below which points contradict the fit …
 RATIO = 1.2  # … if their rms and their median are also so much larger than expected
+NEARER = 1e-3  # chance below which they are nearer than expected, of a ratio below 1 / RATIO
 
 
 @dataclass(frozen=True)
@@ -51,6 +52,17 @@ class HoldoutTest:
     def least_ratio(self) -> float:
         """Ratio of rms to what is expected from which the points can contradict the fit."""
         return max(RATIO, float(np.sqrt(f_limit(CHANCE, *self.freedom))))
+
+    @property
+    def chance_nearer(self) -> float:
+        """How likely a ratio as small would be if fit, noise and covariance were right."""
+        first, second = self.freedom
+        return f_tail(self.ratio**-2, second, first) if self.ratio > 0.0 else 0.0
+
+    @property
+    def nearer(self) -> bool:
+        """Whether the points are nearer than noise and covariance let expect."""
+        return self.ratio < 1.0 / RATIO and self.chance_nearer < NEARER
 
     @property
     def few_off(self) -> bool:

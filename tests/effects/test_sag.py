@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
+from pkmcal.arms.inputs import ERRORS
 from pkmcal.arms.joint_laws import JointLaws, Term
 from pkmcal.arms.joint_pulls import JointPulls
 from pkmcal.arms.weights import at_rest, gravity_torques
@@ -19,7 +20,7 @@ from pkmcal.arrays import FloatArray
 from pkmcal.calibration.rigid import rigid_arm
 from pkmcal.diagnostics.waves import scan_waves
 from pkmcal.fitted.left_out import compared_by_poses
-from pkmcal.kinematics.calibratable import ERRORS, ArmMachine, as_machine
+from pkmcal.kinematics.calibratable import ArmMachine, as_machine
 
 AXES = [[0, 0, 1], [0, 1, 0], [0, 1, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0]]
 POINTS = [[0, 0, 0], [0, 0, 290], [0, 0, 560], [0, 0, 630], [302, 0, 630], [374, 0, 630]]
@@ -137,8 +138,8 @@ def test_sag_that_moves_the_numbers_makes_a_result_doubtful() -> None:
 @pytest.mark.parametrize(
     ("effect", "size", "name", "option"),
     [
-        (pk.Harmonics(1), 5e-4, "eccentric encoders", "--effects harmonics=1"),
-        (pk.Coupling([(6, 4)]), 2e-3, "coupled joints", "--effects coupling=5.4:6.4:6.5"),
+        (pk.Harmonics(1), 5e-4, "eccentric encoder", "--effects harmonics=1@1"),
+        (pk.Coupling([(6, 4)]), 2e-3, "coupled joints", "--effects coupling=6.4"),
     ],
 )
 def test_errors_of_gears_are_named(
@@ -154,6 +155,31 @@ def test_errors_of_gears_are_named(
         texts = [each.text for each in found.verdict.said if each.check == "causes"]
         named += any(name in text and option in text for text in texts)
     assert named == 3
+
+
+@pytest.mark.parametrize(("joint", "alike"), [(2, True), (3, False)])
+def test_an_eccentric_encoder_is_named_beside_the_sag_that_looks_like_it(
+    joint: int, alike: bool
+) -> None:
+    """The weight of its own link turns joint 2 of an upright arm by a wave of its angle alone.
+
+    That of joint 3 goes by the sum of both angles: there sag explains no wave of one joint.
+    """
+    said = []
+    for seed in range(3):
+        arm = pk.Harmonics(1, joints=joint).of_machine(as_machine(built(seed))).machine.arm
+        arm = arm.with_laws(arm.laws.with_values(1e-3 * np.ones(len(arm.laws.names))))
+        found = pk.identify(ARM, measured(commands(60, seed), arm, seed), **UNKNOWN)
+        said += [each.text for each in found.verdict.said if each.check == "sag-lacking"]
+        if not alike:
+            said += [each.text for each in found.verdict.said if each.check == "causes"]
+    assert sum(f"harmonics=1@{joint}" in each for each in said) == 3
+
+
+def test_sag_of_several_joints_is_not_taken_for_a_wave_of_one() -> None:
+    soft = pk.identify(ARM, measured(commands(60, 11), built(4), 12, SOFT, frame=NOWHERE))
+    (said,) = [each for each in soft.verdict.said if each.check == "sag-lacking"]
+    assert "harmonics" not in said.text
 
 
 @pytest.mark.parametrize("shared", [0.0, 0.05])
