@@ -546,7 +546,7 @@ def test_a_guess_that_the_machine_cannot_take_has_no_side(tmp_path: Path) -> Non
     robot = pk.load("linear-delta")
     library = compiled(robot, tmp_path)
     q = robot.inverse(robot.home)[None]
-    far = robot.home + [0.0, 0.0, 0.0, 0.3, 0.0, 0.0]  # tilted, as it cannot be
+    far = robot.home + np.array([0.0, 0.0, 0.0, 0.3, 0.0, 0.0])  # tilted, as it cannot be
     assert library.forward(q, far)[0] == 0
     status, found = library.forward_same_side(q, far)
     assert status == 8
