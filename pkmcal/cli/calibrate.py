@@ -231,15 +231,7 @@ def calibrate(
     given = pk.load(read.robot(robot))
     machine = as_machine(given)
     reading = Reading(
-        controller,
-        join,
-        ignore or (),
-        rename or (),
-        columns,
-        units,
-        rotation,
-        probe_offset,
-        invert_poses,
+        controller, join, ignore, rename, columns, units, rotation, probe_offset, invert_poses
     )
     with warnings.catch_warnings(record=True) as doubts:
         warnings.simplefilter("always", pk.CalibrationWarning)

@@ -60,15 +60,7 @@ def check(
     measured = None
     if measurements is not None:
         reading = Reading(
-            controller,
-            join,
-            ignore or (),
-            rename or (),
-            columns,
-            units,
-            rotation,
-            probe_offset,
-            invert_poses,
+            controller, join, ignore, rename, columns, units, rotation, probe_offset, invert_poses
         )
         measured = reading.measurements(measurements, read, as_machine(machine))
     found = pk.check_geometry(machine)

@@ -91,8 +91,8 @@ class Reading:
 
     controller: Path | None = None
     join: str = "auto"
-    ignore: Sequence[str] = ()
-    rename: Sequence[str] = ()
+    ignore: Sequence[str] | None = None
+    rename: Sequence[str] | None = None
     columns: Path | None = None
     units: str | None = None
     rotation: str | None = None
@@ -104,8 +104,8 @@ class Reading:
         if Path(path).suffix.lower() in (".toml", ".urdf"):
             raise FileError(f"{path}: a robot file, where measurements are needed")
         stated: dict[str, Any] = {} if self.columns is None else _stated(self.columns, read)
-        stated["ignore"] = [*stated.get("ignore", ()), *self.ignore]
-        stated["rename"] = stated.get("rename", {}) | dict(map(_renamed, self.rename))
+        stated["ignore"] = [*stated.get("ignore", ()), *(self.ignore or ())]
+        stated["rename"] = stated.get("rename", {}) | dict(map(_renamed, self.rename or ()))
         if self.units is not None:
             stated["units"] = [unit.strip() for unit in self.units.split(",")]
         if self.rotation is not None:

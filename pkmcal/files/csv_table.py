@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 import re
+import shlex
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
@@ -266,7 +267,12 @@ class Table:
         if self.left_out:
             named = ", ".join(map(repr, self.left_out[:_SHOWN]))
             more = ", …" if len(self.left_out) > _SHOWN else ""
-            hint = f"; not known: {named}{more}; --rename OLD=NEW says what one is"
+            number = re.findall(r"\d+", name)[-1:]
+            alike = [
+                each for each in self.left_out if number and re.findall(r"\d+", each) == number
+            ]
+            typed = shlex.quote(f"{alike[0] if len(alike) == 1 else 'OLD'}={name}")
+            hint = f"; not known: {named}{more}; if one of them is it: --rename {typed}"
         return self.header_error(f"missing column {name!r}{hint}")
 
     def _column(self, name: str) -> Column:

@@ -41,6 +41,8 @@ int missed(const {real} *pose, {real} *by) {{ return robot_missed(pose, by); }}
 _SIDE = """\
 int side(const {real} *q, {real} *pose);
 int side(const {real} *q, {real} *pose) {{ return robot_side(q, pose); }}
+int forward_same_side(const {real} *q, {real} *pose);
+int forward_same_side(const {real} *q, {real} *pose) {{ return robot_forward_same_side(q, pose); }}
 """
 
 
@@ -94,6 +96,9 @@ class Library:
 
     def forward(self, q: Any, guess: Any) -> tuple[Any, Any]:
         return self._rows("forward", q, np.broadcast_to(guess, (len(q), 6)))
+
+    def forward_same_side(self, q: Any, guess: Any) -> tuple[Any, Any]:
+        return self._rows("forward_same_side", q, np.broadcast_to(guess, (len(q), 6)))
 
     def missed(self, poses: Any) -> tuple[Any, Any]:
         return self._rows("missed", poses, np.full((len(poses), 1), np.nan))

@@ -525,6 +525,34 @@ def test_a_pose_from_home_in_another_mode_is_on_another_side(name: str, tmp_path
     assert (ok & ~right).any() or name not in ("3rrr-planar", "linear-delta", "linear-delta-6")
 
 
+@pytest.mark.parametrize("name", [*SIDES, "6-rus", "3rps", "3prs", "2tpr2tps-spatial"])
+def test_forward_same_side_ends_where_the_machine_is_or_says_so(name: str, tmp_path: Path) -> None:
+    """From home to poses near the border: the pose they were made of, or a status and home kept."""
+    robot = pk.load(name)
+    library = compiled(robot, tmp_path)
+    at = pk.sample_poses(robot, 300, seed=11, share=0.9)
+    q = robot.inverse(at, match=True)
+    plain, anywhere = library.forward(q, robot.home)
+    status, found = library.forward_same_side(q, robot.home)
+    ok, right = status == 0, np.abs(anywhere - at).max(axis=1) < 1e-6
+    np.testing.assert_array_equal(ok, (plain == 0) & right)
+    np.testing.assert_array_equal(found[ok], anywhere[ok])
+    np.testing.assert_array_equal(found[~ok], np.broadcast_to(robot.home, found.shape)[~ok])
+    assert set(status[(plain == 0) & ~right]) <= {7}
+    np.testing.assert_array_equal(status[plain != 0], plain[plain != 0])
+
+
+def test_a_guess_that_the_machine_cannot_take_has_no_side(tmp_path: Path) -> None:
+    robot = pk.load("linear-delta")
+    library = compiled(robot, tmp_path)
+    q = robot.inverse(robot.home)[None]
+    far = robot.home + np.array([0.0, 0.0, 0.0, 0.3, 0.0, 0.0])  # tilted, as it cannot be
+    assert library.forward(q, far)[0] == 0
+    status, found = library.forward_same_side(q, far)
+    assert status == 8
+    np.testing.assert_array_equal(found, far[None])
+
+
 @pytest.mark.parametrize("name", [*SIDES, "3rps", "2tpr2tps-spatial"])
 def test_what_a_pose_misses_is_how_far_from_it_the_machine_goes(name: str, tmp_path: Path) -> None:
     robot = pk.load(name)
