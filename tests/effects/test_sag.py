@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
+from pkmcal.arms.inputs import ERRORS
 from pkmcal.arms.joint_laws import JointLaws, Term
 from pkmcal.arms.joint_pulls import JointPulls
 from pkmcal.arms.weights import at_rest, gravity_torques
@@ -19,7 +20,7 @@ from pkmcal.arrays import FloatArray
 from pkmcal.calibration.rigid import rigid_arm
 from pkmcal.diagnostics.waves import scan_waves
 from pkmcal.fitted.left_out import compared_by_poses
-from pkmcal.kinematics.calibratable import ERRORS, ArmMachine, as_machine
+from pkmcal.kinematics.calibratable import ArmMachine, as_machine
 
 AXES = [[0, 0, 1], [0, 1, 0], [0, 1, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0]]
 POINTS = [[0, 0, 0], [0, 0, 290], [0, 0, 560], [0, 0, 630], [302, 0, 630], [374, 0, 630]]
