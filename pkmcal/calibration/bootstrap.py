@@ -189,7 +189,7 @@ class Replicate:
     def _corrected(self) -> FloatArray:
         """Whitened residuals (M,) with the deviation that the noise has."""
         estimate = self._estimate
-        root = np.sqrt(np.repeat(estimate.weights, self._equations.components))
+        root = np.sqrt(np.repeat(estimate.weights, self._equations.blocks.components))
         taken = root[:, None] * estimate.change(estimate.half)
         out = np.empty_like(estimate.residual)
         for pose in range(int(self._pose.max()) + 1):

@@ -284,11 +284,13 @@ class Identification(Solution, Result):
         yield f"{self.robot.name}: {len(self.free)} parameters from {summary.counts(self.read)}"
         if self.sessions:
             yield summary.sessions(self.sessions)
-        if heat := in_words(self.fit.equations.sets, self.expansion, self.fit.parameters.robot):
+        if heat := in_words(
+            self.fit.equations.table.sets, self.expansion, self.fit.parameters.robot
+        ):
             yield summary.filled("", heat)
         yield summary.misfit_table(self)
         yield summary.quality(self)
-        datasets, chosen = self.fit.equations.datasets, self.fit.parameters
+        datasets, chosen = self.fit.equations.prediction.datasets, self.fit.parameters
         framed = len(self.free) > len(chosen.places) or isinstance(self.robot, SerialArm)
         if self.datum.names:
             yield summary.filled("", str(self.datum))

@@ -335,6 +335,6 @@ def _robots(commanded: Equations, end: Evaluation) -> dict[str, Robot | SerialAr
         table = commanded.table
         own = (table.machine_columns == columns).all(axis=1)[table.machine_of_pose]
         if isinstance(robot, Robot):
-            robot = robot.closing(commanded.actuators[own], end.pose[own])
+            robot = robot.closing(commanded.table.actuators[own], end.pose[own])
         found[session] = robot
     return found

@@ -8,7 +8,8 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.compensation.commanded_machine import CommandedMachine
-from pkmcal.compensation.gcode import Move, Program
+from pkmcal.compensation.gcode import Program
+from pkmcal.compensation.gcode_move import Move
 from pkmcal.exceptions import FileError
 
 _ROUNDS = 12
@@ -38,7 +39,7 @@ class ChordErrors:
         parts = np.ones(len(moves), dtype=int)
         worst = np.zeros(len(moves))
         unsettled = np.array(
-            [each.straight and each.known and (each.start != each.target).any() for each in moves],
+            [each.straight and each.known and each.start != each.target for each in moves],
             dtype=bool,
         )
         for _ in range(_ROUNDS):
@@ -68,7 +69,7 @@ class ChordErrors:
         starts = np.array([move.start for move in moves])
         ways = np.array([move.target for move in moves]) - starts
         which = np.repeat(np.arange(len(parts)), parts)
-        first = np.concatenate([np.arange(count) for count in parts])
+        first = counted(parts)
 
         def at(share: FloatArray) -> FloatArray:
             found: FloatArray = starts[which] + share[:, None] * ways[which]
@@ -96,6 +97,12 @@ class ChordErrors:
         unreached = which[~np.isfinite(found).all(axis=1)]
         if len(unreached):
             raise self.unreached(moves[int(unreached[0])])
+
+
+def counted(parts: IntArray) -> IntArray:
+    """0, 1, … of each move, one for each of its parts."""
+    found: IntArray = np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts)
+    return found
 
 
 def slices(parts: IntArray) -> Iterator[slice]:

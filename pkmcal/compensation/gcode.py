@@ -9,81 +9,16 @@ from __future__ import annotations
 import io
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 from pkmcal.arrays import FloatArray
 from pkmcal.compensation.gcode_dialect import AXES, NEVER_PASSED, Dialect, Meaning
 from pkmcal.compensation.gcode_line import Command, Unclear, Word, commands
+from pkmcal.compensation.gcode_move import NO_FEED, Extrusion, Feed, Move
 from pkmcal.exceptions import ArgumentError, FileError
 from pkmcal.files.text_lines import MARK
 
 _HOMING = "homing"  # what messages call it
 _INCH = 25.4
-
-
-class Extrusion(NamedTuple):
-    """The E word of a move, where E was before, and whether the word counts from there.
-
-    None where that is not known.
-    """
-
-    word: Word
-    before: float | None
-    relative: bool | None
-
-
-@dataclass
-class Move:
-    """A G0 or G1 with axis words.
-
-    Attributes
-    ----------
-    line : int
-        Its line, counted from 0.
-    straight : bool
-        G1.
-    start, target : ndarray (axes,)
-        In mm and deg, absolute.
-    known : bool
-        Whether it is known where the move begins.
-    fresh : tuple of float or None, or None
-        Where the controller is before the first move, and before one behind homing or a macro;
-        None of an axis of which that is not known. None if a move ended there.
-    words : dict
-        Its axis words by their letters.
-    relative : bool
-        G91.
-    scale : float
-        Mm of a unit of length.
-    extrusion : Extrusion or None
-        Its E word.
-    feed : float
-        Mm or deg a minute; 0 where none was stated.
-    feed_word : Word or None
-        Its F word.
-    per_turn : bool
-        G95: the feed is of a turn of the spindle.
-    begins_times : bool
-        Whether G93 has to stand before it, where moves are to state their times.
-    behind : str
-        What acts behind it in its line.
-    """
-
-    line: int
-    straight: bool
-    start: FloatArray
-    target: FloatArray
-    known: bool
-    fresh: tuple[float | None, ...] | None
-    words: dict[str, Word]
-    relative: bool
-    scale: float
-    extrusion: Extrusion | None
-    feed: float
-    feed_word: Word | None
-    per_turn: bool
-    begins_times: bool
-    behind: str
 
 
 @dataclass
@@ -96,20 +31,22 @@ class _State:
         Axes of which it is known where they are.
     lost_by : str
         The word behind which that is not known.
+    code : str
+        The last of G0 and G1; empty before them and behind G80.
     own, last : bool or None
         M83; whether the last of G90, G91, M82 and M83 was G91 or M83.
     timed : bool
         Whether moves state their times.
     """
 
-    at: FloatArray
+    at: tuple[float, ...]
     known: set[str]
     lost_by: str = ""
     fresh: bool = True
-    straight: bool | None = None
+    code: str = ""
     relative: bool = False
     scale: float = 1.0
-    feed: float = 0.0
+    feed: Feed = NO_FEED
     per_turn: bool = False
     extruded: float | None = None
     own: bool | None = None
@@ -167,7 +104,8 @@ class Program:
         self.left: dict[str, int] = {}
         self.dialect = dialect
         self._content, self._place = content, place
-        self._letters, self._start, self._stated = letters, start, stated
+        self._letters, self._stated = tuple(letters), stated
+        self._start = tuple(map(float, start))
         self._passed = frozenset(name.upper() for name in passed)
         self._times = times
         for name in sorted(self._passed):
@@ -226,14 +164,17 @@ class Program:
     def _line(self, i: int, line: str, code: str, state: _State) -> tuple[str, Move | None]:
         """A line as it is to be written, and its move."""
         moves, found = [], list(commands(code, self.dialect))
-        scales = {"G20": _INCH, "G21": 1.0}
-        changes = any(scales.get(each.name, state.scale) != state.scale for each in found)
-        if self.dialect.block and changes and any("F" in (each.words or {}) for each in found):
-            raise Unclear(
-                "F beside a change of units is of those before: give it a line of its own"
-            )
+        if self.dialect.block:
+            self._require_feed_of_units(found, state)
+        macro = ""
         for command in found:
             meaning = self._meaning(command)
+            if macro and meaning is not Meaning.HARMLESS:
+                raise Unclear(
+                    f"behind {macro}, {command.shown} may not be executed: break the line"
+                )
+            if meaning in (Meaning.HOMES, Meaning.MOVES) and not self.dialect.block:
+                macro = command.shown
             if meaning is Meaning.HOMES:
                 self._home(state)
             elif meaning is Meaning.MOVES:
@@ -252,12 +193,22 @@ class Program:
             raise Unclear("two moves stand in it: give each a line of its own")
         return line, moves[0] if moves else None
 
+    @staticmethod
+    def _require_feed_of_units(found: Sequence[Command], state: _State) -> None:
+        """Refuse F beside a change of units, before which it acts in a block."""
+        scales = {"G20": _INCH, "G21": 1.0}
+        changes = any(scales.get(each.name, state.scale) != state.scale for each in found)
+        if changes and any("F" in (each.words or {}) for each in found):
+            raise Unclear(
+                "F beside a change of units is of those before: give it a line of its own"
+            )
+
     def _meaning(self, command: Command) -> Meaning:
         """What a command does to the poses of this program."""
-        if not command.name:
+        meaning = self.dialect.meaning(command.name, command.letters)
+        if not command.name or meaning is Meaning.FOLLOWED:
             return Meaning.FOLLOWED
         shown = command.shown.upper()
-        meaning = self.dialect.meaning(command.name, command.letters)
         axes = command.letters & AXES
         if {command.name, shown} & self._passed:  # what is refused may move the machine, too
             return Meaning.MOVES if meaning is not None and meaning.refused else Meaning.HARMLESS
@@ -300,32 +251,29 @@ class Program:
         elif name in ("G94", "G95"):
             state.per_turn = name == "G95"
         elif name == "G80":
-            state.straight = None
+            state.code = ""
         elif name in ("M2", "M30"):
             state.timed = False
 
     def _move(self, i: int, command: Command, state: _State) -> list[Move]:
         """The move of a G0 or G1, or of words alone; none if no axis moves."""
         words = command.words or {}
-        axes = {letter: word for letter, word in words.items() if letter in AXES}
-        unknown = words.keys() - AXES - self.dialect.letters
+        axes = {letter: words[letter] for letter in words if letter in AXES}
+        unknown = words.keys() - axes.keys() - self.dialect.letters
         if not command.name and (axes or not self.dialect.block):
-            if state.straight is None or not self.dialect.block:
+            if not state.code or not self.dialect.block:
                 raise Unclear("axis words without G0 or G1 before them")
         elif command.name:
-            state.straight = command.name == "G1"
+            state.code = command.name
         if unknown:
             raise Unclear(f"{min(unknown)} is no word of {command.shown} that is followed")
         feed = words.get("F")
-        state.feed = state.feed if feed is None else feed.value * state.scale
+        if feed is not None:
+            state.feed = Feed(feed.value * state.scale, feed.value)
         extrusion = self._extrusion(words.get("E"), state)
         if not axes:
             return []
-        foreign = axes.keys() - set(self._letters)
-        if foreign:
-            letters = "".join(self._letters)
-            raise Unclear(f"{min(foreign)} is no axis of the robot, which has {letters}")
-        start, known = state.at, set(self._letters) <= state.known
+        start, known = state.at, state.known.issuperset(self._letters)
         fresh = self._fresh(state)
         state.at = self._target(axes, state)
         begins_times = self._times and not state.timed
@@ -333,7 +281,8 @@ class Program:
         return [
             Move(
                 line=i,
-                straight=bool(state.straight),
+                code=state.code,
+                straight=state.code == "G1" or self.dialect.rapid_lines,
                 start=start,
                 target=state.at,
                 known=known and (self._stated or fresh is None),
@@ -347,38 +296,55 @@ class Program:
                 per_turn=state.per_turn,
                 begins_times=begins_times,
                 behind=command.behind,
+                repeated=self._repeated(words),
             )
         ]
+
+    def _repeated(self, words: dict[str, Word]) -> str:
+        """The words that each part of a move has to state."""
+        if self.dialect.repeated.isdisjoint(words):
+            return ""
+        stated = sorted(self.dialect.repeated & words.keys())
+        return "".join(f" {letter}{words[letter].value:.15g}" for letter in stated)
 
     def _fresh(self, state: _State) -> tuple[float | None, ...] | None:
         """Where the controller is, if that is not where a move ended."""
         if not state.fresh:
             return None
         return tuple(
-            float(value) if letter in state.known else None
+            value if letter in state.known else None
             for letter, value in zip(self._letters, state.at, strict=True)
         )
 
-    def _target(self, axes: dict[str, Word], state: _State) -> FloatArray:
+    def _target(self, axes: dict[str, Word], state: _State) -> tuple[float, ...]:
         """Where a move ends."""
-        if not state.relative:
-            state.known |= axes.keys()
-        unknown = [letter for letter in self._letters if letter not in state.known]
-        if unknown:
-            where = f"where {' and '.join(unknown)} is, is not known here"
-            if state.lost_by:
-                passed = f"; if it moves nothing and changes no mode: --pass {state.lost_by}"
-                unless = "" if {state.lost_by} & {_HOMING, *self._passed} else passed
-                raise Unclear(f"{where}, behind {state.lost_by}: name all axes{unless}")
-            raise Unclear(
-                f"{where}: state the pose at the start, or let the first move name X, Y and Z"
-            )
-        target: FloatArray = state.at.copy()
+        if not state.known.issuperset(self._letters):
+            if not state.relative:
+                state.known |= axes.keys()
+            self._require_known(state)
+        target = list(state.at)
         for letter, word in axes.items():
+            if letter not in self._letters:
+                letters = "".join(self._letters)
+                raise Unclear(f"{letter} is no axis of the robot, which has {letters}")
             k = self._letters.index(letter)
             value = word.value * (state.scale if letter in "XYZ" else 1.0)
             target[k] = target[k] + value if state.relative else value
-        return target
+        return tuple(target)
+
+    def _require_known(self, state: _State) -> None:
+        """Refuse a move from where it is not known that an axis is."""
+        unknown = [letter for letter in self._letters if letter not in state.known]
+        if not unknown:
+            return
+        where = f"where {' and '.join(unknown)} is, is not known here"
+        if state.lost_by:
+            passed = f"; if it moves nothing and changes no mode: --pass {state.lost_by}"
+            unless = "" if {state.lost_by} & {_HOMING, *self._passed} else passed
+            raise Unclear(f"{where}, behind {state.lost_by}: name all axes{unless}")
+        raise Unclear(
+            f"{where}: state the pose at the start, or let the first move name X, Y and Z"
+        )
 
     def _extrusion(self, word: Word | None, state: _State) -> Extrusion | None:
         """The E word of a move, as far as all versions of the firmware agree about it."""

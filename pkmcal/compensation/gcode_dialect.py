@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
+from functools import cache
 from typing import Literal
 
 AXES = frozenset("XYZABCUVW")
-_OF_OFFSETS = AXES | {"L"}
 Rule = Literal["M82 M83", "either", "last"]
 
 
@@ -36,6 +37,7 @@ class Meaning(Enum):
 
 
 _TAKEN = (Meaning.FOLLOWED, Meaning.HARMLESS, Meaning.HOMES, Meaning.MOVES)
+OFFSETS = (AXES | {"L"}, Meaning.ORIGIN)  # of G10, by its letters
 NEVER_PASSED = (
     Meaning.FOLLOWED,
     Meaning.CURVE,
@@ -69,8 +71,8 @@ class Dialect:
         Whether a carriage return alone ends no line.
     behind : frozenset of str
         Words of a block that act behind its move.
-    offsets : dict
-        Words that set offsets where they have one of these letters.
+    by_letters : dict
+        Words that mean something else where they have one of these letters, and what.
     extrusion : tuple of str
         How its versions tell whether E is relative: by M82 and M83 alone, by G91 or M83
         (``"either"``), by the last of G90, G91, M82 and M83.
@@ -82,6 +84,10 @@ class Dialect:
         Whether some of its versions do not read lower case.
     inverse_time : bool
         Whether it has G93.
+    rapid_lines : bool
+        Whether a G0 goes along a line with its feed, as a G1 does.
+    repeated : frozenset of str
+        Words of a move that each of its parts has to state.
     """
 
     title: str
@@ -93,23 +99,29 @@ class Dialect:
     block: bool = False
     newlines: bool = False
     behind: frozenset[str] = frozenset()
-    offsets: dict[str, frozenset[str]] = field(default_factory=lambda: {"G10": _OF_OFFSETS})
+    by_letters: dict[str, tuple[frozenset[str], Meaning]] = field(
+        default_factory=lambda: {"G10": OFFSETS}
+    )
     extrusion: tuple[Rule, ...] = ()
     adds_relative: bool = True
     exact: bool = False
     capitals: bool = False
     inverse_time: bool = False
+    rapid_lines: bool = False
+    repeated: frozenset[str] = frozenset()
 
     def name(self, letter: str, number: str) -> str:
         """A word as its table has it."""
-        if letter.upper() == "T":
-            return "T"
-        return letter.upper() + (number if self.exact else f"{float(number):g}" if number else "")
+        letter = letter.upper()
+        if letter == "T":
+            return letter
+        return letter + (number if self.exact or not number else _shortest(number))
 
     def meaning(self, name: str, letters: frozenset[str]) -> Meaning | None:
         """What a word with these letters means; None if the table has it not."""
-        if not self.offsets.get(name, frozenset()).isdisjoint(letters):
-            return Meaning.ORIGIN
+        of_these = self.by_letters.get(name)
+        if of_these is not None and not of_these[0].isdisjoint(letters):
+            return of_these[1]
         return self.words.get(name)
 
     def e_is_relative(self, own: bool | None, axes: bool, last: bool | None) -> bool | None:
@@ -124,20 +136,39 @@ class Dialect:
         last : bool or None
             Whether the last of G90, G91, M82 and M83 was G91 or M83.
         """
-        either = True if axes else own
-        found = {{"M82 M83": own, "either": either, "last": last}[rule] for rule in self.extrusion}
-        return found.pop() if len(found) == 1 else None
+        return _agreed(self.extrusion, own, axes, last)
 
 
-def table(**names: str) -> dict[str, Meaning]:
-    """A table from names in a text, by meaning in lower case; ``M3-M5`` stands for all between."""
-    found: dict[str, Meaning] = {}
+@cache
+def _agreed(
+    rules: tuple[Rule, ...], own: bool | None, axes: bool, last: bool | None
+) -> bool | None:
+    """What all rules say."""
+    said = {"M82 M83": own, "either": True if axes else own, "last": last}
+    found = {said[rule] for rule in rules}
+    return found.pop() if len(found) == 1 else None
+
+
+@cache
+def _shortest(number: str) -> str:
+    """A number without zeros that say nothing."""
+    return f"{float(number):g}"
+
+
+def table(*also: Mapping[str, Meaning], **names: str) -> dict[str, Meaning]:
+    """A table from names in a text, by meaning in lower case; ``M3-M5`` stands for all between.
+
+    With `also` its words stand beside those of other tables.
+    """
+    words = [word for each in also for word in each.items()]
     for meaning, text in names.items():
-        for name in text.split():
-            for each in _between(name):
-                if each in found:
-                    raise ValueError(f"{each} stands twice in the table")
-                found[each] = Meaning[meaning.upper()]
+        words += [
+            (each, Meaning[meaning.upper()]) for name in text.split() for each in _between(name)
+        ]
+    found = dict(words)
+    if len(found) < len(words):
+        twice = sorted(name for name, _ in words if [each for each, _ in words].count(name) > 1)
+        raise ValueError(f"{twice[0]} stands twice in the table")
     return found
 
 

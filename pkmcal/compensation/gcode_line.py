@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -18,19 +17,19 @@ def _ascii(pattern: str) -> re.Pattern[str]:
 
 
 _WORD = _ascii(rf"([A-Za-z])[ \t]*({_NUMBER})")
-_PLAIN = _ascii(rf"\s*(?:[A-Za-z][ \t]*{_NUMBER}\s*)*")
+_PLAIN = _ascii(rf"[ \t]*(?:[A-Za-z][ \t]*{_NUMBER}[ \t]*)*")
 _HEAD = _ascii(
-    r"\s*(?:[Nn][ \t]*\d+(?:[ \t]+|$))?"
+    r"[ \t]*(?:[Nn][ \t]*\d+(?:[ \t]+|$))?"
     r"(?:([A-Za-z_][A-Za-z_]\w*)|([GMTgmt])[ \t]*(\d+(?:\.\d+)?)?)?"
 )
 _EXPONENT = _ascii(r"[\d.][Ee][-+]?[\d.]")
-_CHECKSUM = _ascii(r".*\*\s*\d+\s*")
+_CHECKSUM = _ascii(r".*\*[ \t]*\d+[ \t]*")
 _TEXT = _ascii(r'"[^"]*"?|\{[^{}]*\}')
 _NEXT = _ascii(r"[GgMm]")
 _PASSED_OVER = _ascii(r"(?<![A-Za-z_=])[GgMm](?=[ \t]*\d)")
 _LETTER = _ascii(r"(?<![A-Za-z_=])[A-Za-z](?![A-Za-z_])")
-_PROGRAM_NUMBER = _ascii(r"\s*[Oo]\s*\d+\s*")
-_REMARK_ALONE = _ascii(r"\s*\([^()]*\)\s*")
+_PROGRAM_NUMBER = _ascii(r"[ \t]*[Oo][ \t]*\d+[ \t]*")
+_REMARK_ALONE = _ascii(r"[ \t]*\([^()]*\)[ \t]*")
 
 
 class Word(NamedTuple):
@@ -42,8 +41,7 @@ class Word(NamedTuple):
     value: float
 
 
-@dataclass(frozen=True)
-class Command:
+class Command(NamedTuple):
     """A command and its words.
 
     Attributes
@@ -83,7 +81,7 @@ def commands(line: str, dialect: Dialect) -> list[Command]:
         A line that versions of the firmware read differently, or not at all.
     """
     code = _compiled(dialect.remark).sub(_blank, line)
-    if not code.strip() or code.strip() == "%":
+    if code.strip() in ("", "%"):
         return []
     return _of_block(code, dialect) if dialect.block else _in_turn(code, dialect)
 
@@ -125,11 +123,11 @@ def _of_block(code: str, dialect: Dialect) -> list[Command]:
     letters = frozenset(words)
     owner = next((k for k, each in enumerate(codes) if _takes_axes(each, dialect)), None)
     if owner is not None and letters & AXES:
-        codes[owner] = replace(codes[owner], letters=letters)
+        codes[owner] = codes[owner]._replace(letters=letters)
         letters -= AXES
     words = {letter: word for letter, word in words.items() if letter in letters - others}
     if motion.name or words:
-        codes.append(replace(motion, words=words, letters=frozenset(words), behind=behind))
+        codes.append(motion._replace(words=words, letters=frozenset(words), behind=behind))
     return codes
 
 
@@ -157,7 +155,7 @@ def _in_turn(code: str, dialect: Dialect) -> list[Command]:
                 f"{dialect.title} reads one command a line and passes over {command.shown}"
             )
         if found:
-            found[-1] = replace(found[-1], behind=command.shown)
+            found[-1] = found[-1]._replace(behind=command.shown)
         found.append(command)
         code = " " * end + code[end:]
     return found
@@ -173,21 +171,22 @@ def _command(code: str, dialect: Dialect) -> tuple[Command, int]:
         name = shown = macro.upper()
     elif letter:
         name, shown = dialect.name(letter, number or ""), letter + (number or "")
+    rest = code[head.end() :]
     if macro and dialect.several and name not in dialect.words and _NEXT.search(name):
         raise Unclear(f"{shown} has a G or M in it, with which {dialect.title} begins a command")
     if dialect.capitals and letter and letter.islower():
         raise Unclear(f"{shown} is not in capitals: {dialect.title} may not read it")
-    quoted = dialect.several and code[head.end() :].lstrip().startswith('"')
-    if name in dialect.texts and not quoted:
+    if name in dialect.texts and not (dialect.several and rest.lstrip().startswith('"')):
         return Command(name, shown), len(code)
-    rest = _TEXT.sub(lambda found: "_" * len(found[0]), code[head.end() :])
+    if '"' in rest or "{" in rest:
+        rest = _TEXT.sub(lambda found: "_" * len(found[0]), rest)
     following = None if macro else (_NEXT if dialect.several else _PASSED_OVER).search(rest)
     if following is not None:
         rest = rest[: following.start()]
     end = head.end() + len(rest)
     if name and dialect.words.get(name) is not Meaning.FOLLOWED:
         return Command(name, shown, frozenset(_LETTER.findall(rest.upper()))), end
-    if _CHECKSUM.fullmatch(code):
+    if "*" in code and _CHECKSUM.fullmatch(code):
         raise Unclear("the checksum would no longer be right: take checksums out")
     words: dict[str, Word] = {}
     for each, word, _ in _words(" " * head.end() + rest, dialect, code):
@@ -199,11 +198,13 @@ def _words(code: str, dialect: Dialect, line: str) -> list[tuple[str, Word, str]
     """The words of plain G-code, each with its letter and the text of its number."""
     if not _PLAIN.fullmatch(code):
         raise Unclear(f"{line.strip()!r:.40} is no plain G-code: words and numbers alone")
-    if _EXPONENT.search(code):
+    capitals = code.upper()
+    if "E" in capitals and _EXPONENT.search(code):
         raise Unclear("E right behind a number may be an exponent: put a space before it")
-    if dialect.capitals and code != code.upper():
+    if dialect.capitals and code != capitals:
         raise Unclear(f"words that are not in capitals: {dialect.title} may not read them")
-    return [
-        (each[1].upper(), Word(each.start(), *each.span(2), float(each[2])), each[2])
-        for each in _WORD.finditer(code)
-    ]
+    found = []
+    for each in _WORD.finditer(capitals):
+        letter, number = each.groups()
+        found.append((letter, Word(each.start(), *each.span(2), float(number)), number))
+    return found

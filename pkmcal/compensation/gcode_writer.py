@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from pkmcal.arrays import FloatArray
 from pkmcal.compensation.commanded_machine import CommandedMachine
-from pkmcal.compensation.gcode import Move, Program
+from pkmcal.compensation.gcode import Program
+from pkmcal.compensation.gcode_move import Move
 from pkmcal.files.text_lines import MARK
 
 _DECIMALS = 5  # 10 nm, 0.04 arc seconds
 _FIGURES = 7  # of a feed
 _SLOWER = 0.02  # share by which the speed of a turning machine may differ
+_HALF = 0.5 * 10.0**-_DECIMALS
+_Rows = Sequence[Sequence[float]]
 
 
 class Writer:
@@ -21,9 +26,10 @@ class Writer:
         self._program, self._machine = program, machine
         self._last: list[float | None] = [None] * len(machine.written)
         self._lengths = np.array([letter in "XYZ" for letter in machine.letters])
+        self._only_lengths = bool(self._lengths.all())
 
     def lines(
-        self, line: str, move: Move, points: FloatArray, commands: FloatArray, share: FloatArray
+        self, line: str, move: Move, points: _Rows, commands: _Rows, share: Sequence[float]
     ) -> str:
         """A move's line, and those of its further parts.
 
@@ -33,38 +39,40 @@ class Writer:
             The line of the program.
         move : Move
             What is in it.
-        points, commands : ndarray (parts, axes)
+        points, commands : sequence of sequence of float
             Where its parts end, as meant and as the controller is told.
-        share : ndarray (parts,)
+        share : sequence of float
             The shares of the move that they end.
         """
-        end = line[len(line.rstrip("\r\n")) :] or "\n"
+        bare = line.rstrip("\r\n")
+        end = line[len(bare) :] or "\n"
         self._require(move, len(points))
         if move.fresh is not None:
             known = list(move.fresh) if not self._machine.joints else []
             self._last = known or [None] * len(self._last)
         pieces = []
-        before, done, fed = move.start, 0.0, False
+        before: Sequence[float] = move.start
+        done, fed = 0.0, False
         for k, (point, command, part) in enumerate(zip(points, commands, share, strict=True)):
             last = list(self._last)
             words = self._words(move, command, first=k == 0)
-            extra = self._extruded(line, move, done, part, len(points))
+            extra = self._extruded(move, done, part, len(points))
             feed = self._feed(move, before, point, last)
             fed = fed or feed != ""
             pieces.append((words, extra, feed))
-            before, done = point, float(part)
-        text = _first(line.rstrip("\r\n"), move, *pieces[0]) + end
+            before, done = point, part
+        text = _first(bare, move, *pieces[0]) + end
         if move.begins_times:
             mark = MARK if text.startswith(MARK) else ""
             text = mark + "G93" + end + text[len(mark) :]
-        head = "G1" if move.straight else "G0"
         for words, extra, feed in pieces[1:]:
             named = [letter + value for letter, value in words.items()]
-            text += " ".join([head, *named, *filter(None, [extra, feed])]) + end
+            text += " ".join([move.code, *named, *filter(None, [extra, feed])])
+            text += move.repeated + end
         if fed and not self._machine.joints:
             head = "" if self._program.dialect.block else "G1 "
-            text += f"{head}F{_figures(move.feed / move.scale)}" + end
-        return text if line.endswith(("\n", "\r")) else text[: -len(end)]
+            text += f"{head}F{_figures(move.feed.turns)}" + end
+        return text if len(bare) < len(line) else text[: -len(end)]
 
     def _require(self, move: Move, parts: int) -> None:
         """Refuse what cannot be written."""
@@ -73,7 +81,7 @@ class Writer:
             raise self._program.wrong(
                 move.line, "joint moves are made of absolute coordinates in mm"
             )
-        if self._machine.joints and move.straight and (move.per_turn or move.feed <= 0.0):
+        if self._machine.joints and move.straight and (move.per_turn or move.feed.turns <= 0.0):
             raise self._program.wrong(
                 move.line, "a joint move needs the feed F of its G1, in mm a minute"
             )
@@ -89,17 +97,20 @@ class Writer:
                 f"{move.behind} acts behind a move that is made in parts: give it another line",
             )
 
-    def _words(self, move: Move, command: FloatArray, first: bool) -> dict[str, str]:
+    def _words(self, move: Move, command: Sequence[float], first: bool) -> dict[str, str]:
         """The words of a point: those that the line has, and those that change."""
         words = {}
+        joints = self._machine.joints
         for k, letter in enumerate(self._machine.written):
-            scale = move.scale if letter in "XYZ" and not self._machine.joints else 1.0
-            value = round(float(command[k]) / scale, _DECIMALS)
-            last = self._last[k]
-            known = last is not None and abs(last / scale - value) < 0.5 * 10.0**-_DECIMALS
-            if known and not (first and letter in move.words and not self._machine.joints):
+            scale = move.scale if letter in "XYZ" and not joints else 1.0
+            value, last = round(command[k] / scale, _DECIMALS), self._last[k]
+            if (
+                last is not None
+                and abs(last / scale - value) < _HALF
+                and (joints or not first or letter not in move.words)
+            ):
                 continue
-            if move.relative and not self._machine.joints:
+            if move.relative and not joints:
                 shown = value - (0.0 if last is None else last / scale)
                 words[letter] = number(shown, _DECIMALS)
                 value = (0.0 if last is None else last / scale) + round(shown, _DECIMALS)
@@ -107,16 +118,14 @@ class Writer:
                 words[letter] = number(value, _DECIMALS)
             self._last[k] = value * scale
         if not words:  # of a joint move that stays: no move is without
-            words[self._machine.written[0]] = number(float(command[0]), _DECIMALS)
+            words[self._machine.written[0]] = number(command[0], _DECIMALS)
         return words
 
-    def _extruded(self, line: str, move: Move, done: float, part: float, count: int) -> str:
-        """The E word of a part."""
-        if move.extrusion is None:
+    def _extruded(self, move: Move, done: float, part: float, count: int) -> str:
+        """The E word of a part; of a move in one none, which has its own."""
+        if move.extrusion is None or count == 1:
             return ""
         word, before, relative = move.extrusion
-        if count == 1:
-            return f"E{line[word.start : word.end]}"
         if relative is None:
             raise self._program.wrong(
                 move.line,
@@ -134,7 +143,11 @@ class Writer:
         return f"E{number(before + (word.value - before) * part, _DECIMALS)}"
 
     def _feed(
-        self, move: Move, before: FloatArray, point: FloatArray, last: list[float | None]
+        self,
+        move: Move,
+        before: Sequence[float],
+        point: Sequence[float],
+        last: Sequence[float | None],
     ) -> str:
         """The F word of a part.
 
@@ -142,55 +155,69 @@ class Writer:
         another time: it takes F along X, Y and Z, and along angles where none of these moves.
         """
         joints = self._machine.joints
-        if not move.straight or (not joints and (self._lengths.all() or None in last)):
+        if not move.straight or (not joints and (self._only_lengths or None in last)):
             return ""
-        way = self._way(point - before)
+        meant, way = self._way(np.subtract(point, before))
+        rate = move.feed.lengths if meant else move.feed.turns
         if joints:
-            return f"F{_figures(move.feed / way)}" if way else "F1000000"
+            return f"F{_figures(rate / way)}" if way else "F1000000"
         step = np.array(self._last, dtype=float) - np.array(last, dtype=float)
-        lengths = self._lengths
-        longer = self._way(step) / way if way else 1.0
-        if np.any(step[lengths]) != np.any((point - before)[lengths]):
-            longer *= 1.0 / move.scale if np.any(step[lengths]) else move.scale
-        if longer == 0.0 or abs(longer - 1.0) <= _SLOWER:
+        written, longer = self._way(step)
+        taken = move.feed.lengths if written else move.feed.turns
+        if not taken:  # at a speed of the firmware's own
+            rate = taken = 1.0
+        if not way or not longer or abs(longer * rate - way * taken) <= _SLOWER * way * taken:
             return ""
-        if move.feed <= 0.0:
+        if move.feed.turns <= 0.0:
             raise self._program.wrong(move.line, "needs a feed F: corrected, its length changes")
-        return f"F{_figures(move.feed / move.scale * longer)}"
+        if not np.isclose(move.feed.lengths, move.feed.turns * move.scale, rtol=1e-9, atol=0.0):
+            raise self._program.wrong(
+                move.line,
+                "its feed F was stated in other units, which changes it along X Y Z and not along"
+                " angles: state F again behind G20 or G21",
+            )
+        return f"F{_figures(longer / (move.scale if written else 1.0) * rate / way)}"
 
-    def _way(self, step: FloatArray) -> float:
-        """How long a step is to a feed: mm, or degrees if only angles change."""
-        return float(np.linalg.norm(step[self._lengths]) or np.linalg.norm(step[~self._lengths]))
+    def _way(self, step: FloatArray) -> tuple[bool, float]:
+        """Whether a step has lengths, and how long it is to a feed: mm, or deg without any."""
+        way = float(np.linalg.norm(step[self._lengths]))
+        return way > 0.0, way or float(np.linalg.norm(step[~self._lengths]))
 
 
 def _first(line: str, move: Move, words: dict[str, str], extra: str, feed: str) -> str:
     """The line of the program with other numbers in it."""
     edits = []
+    end = 0
     for letter, word in move.words.items():
-        if letter in words and abs(float(words[letter]) - word.value) < 0.5 * 10.0**-_DECIMALS:
-            continue  # as it was written
-        if letter in words:
-            edits.append((word.start, word.end, words[letter]))
-        else:  # joint moves have words of their own
+        end = max(end, word.end)
+        new = words.get(letter)
+        if new is None:  # joint moves have words of their own
             edits.append((word.at, word.end, ""))
-    if move.extrusion is not None:
+        elif abs(float(new) - word.value) >= _HALF:  # else as it was written
+            edits.append((word.start, word.end, new))
+    if extra and move.extrusion is not None:
         edits.append((move.extrusion.word.start, move.extrusion.word.end, extra[1:]))
     if feed and move.feed_word is not None:
         edits.append((move.feed_word.start, move.feed_word.end, feed[1:]))
-    added = [letter + value for letter, value in words.items() if letter not in move.words]
-    added += [feed] if feed and move.feed_word is None else []
-    end = max(word.end for word in move.words.values())
-    edits.append((end, end, "".join(" " + word for word in added)))
-    for start, end, new in sorted(edits, reverse=True):
-        line = line[:start] + new + line[end:]
-    return line
+    added = "".join(f" {letter}{new}" for letter, new in words.items() if letter not in move.words)
+    if feed and move.feed_word is None:
+        added += " " + feed
+    if added:
+        edits.append((end, end, added))
+    edits.sort()
+    text, at = "", 0
+    for start, end, new in edits:
+        text += line[at:start] + new
+        at = end
+    return text + line[at:]
 
 
 def number(value: float, decimals: int) -> str:
     """A number of G-code: no more decimals than it needs."""
     text = f"{value:.{decimals}f}"
-    text = text.rstrip("0").rstrip(".") if "." in text else text
-    return "0" if text in ("-0", "") else text
+    if decimals:
+        text = text.rstrip("0").rstrip(".")
+    return "0" if text == "-0" else text
 
 
 def _figures(value: float) -> str:

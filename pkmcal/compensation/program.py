@@ -95,8 +95,8 @@ def compensate_program(
     r"""Correct a program in plain G-code for a controller that has other numbers than the machine.
 
     The poses of its G0 and G1 become those at which the controller drives the actuators to where
-    the calibrated machine has the pose that was meant. Long G1 moves are split so that the machine
-    keeps to straight lines. Feed, comments, macros and all else stay as they are.
+    the calibrated machine has the pose that was meant. Long G1 moves, and G0 of printers, are split
+    so that the machine keeps to straight lines. Feed, comments, macros and all else stay.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def compensate_program(
     firmware : {"linuxcnc", "marlin", "reprap", "klipper"}
         What reads the program: words mean different things to different controllers.
     chord : float
-        How far the machine may be found off the straight line of a G1, as `chord_error` is, mm.
+        How far the machine may be found off the straight line of a move, as `chord_error` is, mm.
     joints : bool
         Write actuator coordinates in place of poses, as X Y Z A B C in the order of the actuators,
         mm and deg, for a LinuxCNC without kinematics; feed as inverse time, G93.

@@ -8,9 +8,10 @@ from itertools import islice
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
-from pkmcal.compensation.chord_errors import ChordErrors, slices
+from pkmcal.compensation.chord_errors import ChordErrors, counted, slices
 from pkmcal.compensation.commanded_machine import CommandedMachine
-from pkmcal.compensation.gcode import Move, Program
+from pkmcal.compensation.gcode import Program
+from pkmcal.compensation.gcode_move import Move
 from pkmcal.compensation.gcode_writer import Writer
 
 _LINES = 4096  # that are in memory
@@ -56,7 +57,7 @@ class Pieces:
 
     def _piece(self, lines: _Lines, moves: Sequence[Move], parts: IntArray) -> str:
         """Lines, their moves in so many parts."""
-        share = np.concatenate([np.arange(1, count + 1) / count for count in parts])
+        share = (counted(parts) + 1.0) / np.repeat(parts, parts)
         which = np.repeat(np.arange(len(moves)), parts)
         starts = np.array([move.start for move in moves])
         targets = np.array([move.target for move in moves])
@@ -65,13 +66,14 @@ class Pieces:
         commands = self._commands(moves, which, points)
         self.moves, self.segments = self.moves + len(moves), self.segments + len(points)
         self._compare(points, commands)
-        text, at = [], 0
+        text, at, told = [], 0, commands.tolist()
+        meant, shares = points.tolist(), share.tolist()
         counts = iter(parts.tolist())
         for line, move in lines:
             if move is not None:
                 rows = slice(at, at + next(counts))
                 at = rows.stop
-                line = self._writer.lines(line, move, points[rows], commands[rows], share[rows])
+                line = self._writer.lines(line, move, meant[rows], told[rows], shares[rows])
             text.append(line)
         return "".join(text)
 

@@ -13,6 +13,7 @@ KLIPPER = Dialect(
     exact=True,
     newlines=True,
     texts=frozenset({"M23", "M28", "M32", "M117", "M118", "ECHO", "RESPOND", "SET_DISPLAY_TEXT"}),
+    rapid_lines=True,
     words=table(
         followed="G0 G1 G21 G90 G91 G92 M82 M83",
         harmless="""

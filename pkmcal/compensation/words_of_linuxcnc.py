@@ -21,8 +21,8 @@ LINUXCNC = Dialect(
         """,
         moves="G28 G30 M6 M100-M199",
         curve="""
-            G2 G3 G5 G5.1 G5.2 G5.3 G33 G33.1 G38.2 G38.3 G38.4 G38.5 G41 G41.1 G42 G42.1 G73
-            G74 G76 G81-G89
+            G2 G3 G5 G5.1 G5.2 G5.3 G33 G33.1 G38.2 G38.3 G38.4 G38.5 G41 G41.1 G42 G42.1
+            G70-G74 G71.1 G71.2 G72.1 G72.2 G76 G81-G89
         """,
         origin="G7 G10 G43 G43.1 G43.2 G52 G53 G55-G59 G59.1 G59.2 G59.3 G92 G92.3",
         numbers="M428-M430",

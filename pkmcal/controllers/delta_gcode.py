@@ -27,12 +27,14 @@ from pkmcal.controllers.gcode_words import (
     Commands,
     Settings,
     changed,
+    commanded,
     each,
-    in_inches,
     lines,
     number,
     numbers,
     off_towers,
+    place_of,
+    require_mm,
     require_positive,
     settings,
 )
@@ -168,6 +170,7 @@ def of_reprap(text: str, place: str = "M665") -> FirmwareDelta:
     ValueError
         A number that is missing, or a bed that the firmware takes to be tilted.
     """
+    require_mm(text, place, "M665", "M666")
     size, ends = settings(text, "M665", place), settings(text, "M666", place)
     for letter in "AB":
         if number(ends, letter, "M666", place, 0.0):
@@ -191,18 +194,19 @@ def of_marlin(text: str, place: str = "M665") -> FirmwareDelta:
     ValueError
         A number that is missing, or one that Marlin does not take.
     """
-    if in_inches(text):
-        raise FileError(f"{place}: G20: the numbers are in inches; list them in mm, after G21")
+    require_mm(text, place, "M665", "M666", "M851")
+    _require_no_home_offset(text, place)
     size, ends = settings(text, "M665", place), settings(text, "M666", place)
     radius, rod = number(size, "R", "M665", place), number(size, "L", "M665", place)
     arms = [rod + number(size, letter, "M665", place, 0.0) for letter in "ABC"]
     height = number(size, "H", "M665", place) + marlin_probe(text, place)[2]
     adjustments = [number(ends, letter, "M666", place, 0.0) for letter in "XYZ"]
-    if max(adjustments) > 0.0:
-        raise FileError(
-            f"{place}: X Y Z of M666 must not be above 0, found {max(adjustments):g}: Marlin takes"
-            " no such number"
-        )
+    for letter, adjustment in zip("XYZ", adjustments, strict=True):
+        if adjustment > 0.0:
+            raise FileError(
+                f"{place_of(text, ends[letter], place)}: {letter} of M666 must not be above 0,"
+                f" found {adjustment:g}: Marlin takes no such number"
+            )
     ats = [height - adjustment for adjustment in adjustments]
     return _delta(size, radius, arms, ats, place)
 
@@ -223,21 +227,41 @@ def marlin_probe(text: str, place: str) -> tuple[float, float, float]:
             " M503 lists none: then there is no bed probe"
         )
     x, y = (number(found, letter, "M851", place, 0.0) for letter in "XY")
-    return x, y, -number(found, "Z", "M851", place)
+    return x, y, 0.0 - number(found, "Z", "M851", place)
+
+
+def _require_no_home_offset(text: str, place: str) -> None:
+    """Refuse M206, by which some versions home elsewhere than to H."""
+    for letter, offset in settings(text, "M206", place, missing=True).items():
+        if letter in "XYZ" and number({letter: offset}, letter, "M206", place):
+            raise FileError(
+                f"{place_of(text, offset, place)}: {letter} of M206 moves where Marlin homes to,"
+                " which a robot file does not hold: set M206 X0 Y0 Z0, home, and list the settings"
+                " again"
+            )
 
 
 def reprap_probe(text: str, place: str) -> tuple[float, float, float] | None:
-    """The offset of RepRapFirmware's bed probe K0; None where G31 does not set its height.
+    """The offset of RepRapFirmware's bed probe K0; None where the text sets no height of a probe.
+
+    M851 of RepRapFirmware is the Z of G31 with the other sign, and no more.
 
     Raises
     ------
     ValueError
-        It is no plain number, or set under a condition.
+        It is no plain number, in inches, set under a condition, or of other probes than K0.
     """
+    require_mm(text, place, "G31", "M851")
     found = settings(text, "G31", place, missing=True, kind="0")
-    if "Z" not in found:
+    marlin = settings(text, "M851", place, missing=True)
+    if "Z" not in found and "Z" not in marlin:
+        if commanded(text, "G31"):
+            raise FileError(f"{place}: G31 sets no height Z of the probe K0")
         return None
     x, y = (number(found, letter, "G31", place, 0.0) for letter in "XY")
+    last = max(each["Z"].start for each in (found, marlin) if "Z" in each)
+    if "Z" in marlin and marlin["Z"].start == last:
+        return x, y, 0.0 - number(marlin, "Z", "M851", place)
     return x, y, number(found, "Z", "G31", place)
 
 

@@ -31,7 +31,7 @@ def firmware_of(text: str, place: str) -> Firmware:
         return "klipper"
     if number(settings(text, "M669", place, missing=True), "K", "M669", place, 0.0) == _HANGPRINTER:
         return "hangprinter"
-    marlin = bool(_LISTED.search(text) or commanded(text, "M851"))
+    marlin = bool(_LISTED.search(text) or _has_all(text, place, "M851", "XYZ"))
     reprap = bool(commanded(text, "M669", *_OF_REPRAP) or "RepRapFirmware" in text)
     if marlin is reprap:
         raise FileError(
@@ -40,3 +40,8 @@ def firmware_of(text: str, place: str) -> Firmware:
             " and in Marlin"
         )
     return "marlin" if marlin else "reprap"
+
+
+def _has_all(text: str, place: str, command: str, letters: str) -> bool:
+    """Whether a command has all these letters: RepRapFirmware's M851 knows Z alone."""
+    return set(letters) <= settings(text, command, place, missing=True).keys()

@@ -128,10 +128,24 @@ def commanded(text: str, *codes: str) -> list[Command]:
     ]
 
 
-def in_inches(text: str) -> bool:
-    """Whether G20 is in force at the end."""
-    units = [code[0] for _, code in _codes(text) if code[0] in ("G20", "G21")]
-    return units[-1:] == ["G20"]
+def require_mm(text: str, place: str, *commands: str) -> None:
+    """Refuse numbers of these commands where G20 is in force: versions differ in what it is for.
+
+    Raises
+    ------
+    FileError
+        G20 stands above one of them, with its line.
+    """
+    inches = False
+    for line, code in _codes(text):
+        inches = code[0] == "G20" if code[0] in ("G20", "G21") else inches
+        if inches and code[0] in commands:
+            raise _wrong(line, place, "stands behind G20, in inches: list it in mm, behind G21")
+
+
+def place_of(text: str, setting: Setting, place: str) -> str:
+    """Where a setting is, for messages."""
+    return f"{place}, line {text.count(chr(10), 0, setting.start) + 1}"
 
 
 def changed(text: str, place: str, commands: Commands) -> str:

@@ -53,8 +53,8 @@ def of_klipper(path: str | PathLike[str]) -> Stored:
         A file that cannot be read.
     """
     printer = read(path)
-    absent = tuple(f"{file}, included, is not there and was not read" for file in printer.absent)
-    where, probe = Path(printer.place), _probe(printer)
+    notes = tuple(f"{file}, included, is not there and was not read" for file in printer.absent)
+    where, (probe, unread) = Path(printer.place), _probe(printer)
     controller = Controller("klipper", where.name)
     heights, distances = _heights(printer), _distances(printer)
     if kinematics(printer) == "rotary_delta":
@@ -67,7 +67,7 @@ def of_klipper(path: str | PathLike[str]) -> Stored:
         about = About(where.stem, _LINEAR_HEAD.format(file=where.name), probe, controller)
         rods = heights is not None and distances is not None
         text = linear_delta.text_of(delta, steps, about, bed=True, rods=rods)
-    return Stored(text, heights, distances, absent)
+    return Stored(text, heights, distances, (*notes, *unread))
 
 
 def _linear(printer: PrinterConfig) -> tuple[FirmwareDelta, list[float]]:
@@ -112,25 +112,37 @@ def _first(printer: PrinterConfig, section: str, option: str) -> float:
     return printer.number(section if printer.has(section, option) else STEPPERS[0], option)
 
 
-def _probe(printer: PrinterConfig) -> tuple[float, float, float] | None:
-    """The offset of the bed probe; None where the file has none.
+def _probe(
+    printer: PrinterConfig,
+) -> tuple[tuple[float, float, float] | None, tuple[str, ...]]:
+    """The offset of the bed probe, None where it cannot be read; and notes on what was not read.
 
     Raises
     ------
     ValueError
         Two probes: the firmware takes one.
     """
-    there = [
-        section
-        for section in printer.sections("z_offset")
-        if section in _PROBES or section.startswith(_NAMED_PROBE)
-    ]
-    if not there:
-        return None
-    if len(there) > 1:
-        raise printer.wrong(there[1], "z_offset", f"is of a second probe beside [{there[0]}]")
-    x, y = (printer.number(there[0], option, 0.0) for option in ("x_offset", "y_offset"))
-    return x, y, printer.number(there[0], "z_offset")
+    offsets = ("x_offset", "y_offset", "z_offset")
+    found = printer.sections(*offsets)
+    known = [each for each in found if each in _PROBES or each.startswith(_NAMED_PROBE)]
+    others = [each for each in found if each not in known]
+    notes = tuple(
+        f"{printer.place}: [{section}] has offsets and is no probe that is known: they were not"
+        " read; state the offset of the probe in the robot file"
+        for section in others
+        if {"x_offset", "y_offset"} <= {each for each in offsets if printer.has(section, each)}
+    )
+    if not known:
+        return None, notes
+    if len(known) > 1:
+        option = next(each for each in offsets if printer.has(known[1], each))
+        raise printer.wrong(known[1], option, f"is of a second probe beside [{known[0]}]")
+    (section,) = known
+    if not printer.has(section, "z_offset"):
+        unread = f"{printer.place}: [{section}] has no z_offset: the offset of the probe was not"
+        return None, (*notes, f"{unread} read; state it in the robot file")
+    x, y = (printer.number(section, option, 0.0) for option in ("x_offset", "y_offset"))
+    return (x, y, printer.number(section, "z_offset")), notes
 
 
 def _count(printer: PrinterConfig, name: str) -> int:

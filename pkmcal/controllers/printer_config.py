@@ -200,9 +200,9 @@ class PrinterConfig:
         """Whether there is such an option."""
         return (section, option) in self._options
 
-    def sections(self, option: str) -> list[str]:
-        """The sections that have such an option."""
-        return [section for section, name in self._options if name == option]
+    def sections(self, *options: str) -> list[str]:
+        """The sections that have one of these options, each once."""
+        return list(dict.fromkeys(section for section, name in self._options if name in options))
 
     def text(self, section: str, option: str, default: str | None = None, depth: int = 0) -> str:
         """What an option says, `depth` names away from the one that was asked for.

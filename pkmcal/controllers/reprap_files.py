@@ -13,7 +13,7 @@ from os import PathLike
 from pathlib import Path
 
 from pkmcal.arguments import path as as_path
-from pkmcal.controllers.gcode_words import Command, commanded, settings
+from pkmcal.controllers.gcode_words import Command, commanded, require_mm, settings
 from pkmcal.exceptions import FileError
 from pkmcal.files.text_lines import text_in
 
@@ -87,6 +87,7 @@ class _Run:
         """The text of a file, with that of the files it runs behind their commands."""
         for code in GEOMETRY:  # a mistake is named with the line of its own file
             settings(text, code, str(file), missing=True)
+        require_mm(text, str(file), *GEOMETRY)
         if len(within) > 1 and (sets := [c for c in GEOMETRY if commanded(text, c)]):
             self.hides.append(f"{file} sets {' and '.join(sets)}")
         parts, last = [], 0

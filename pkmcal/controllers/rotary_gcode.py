@@ -18,6 +18,7 @@ from pkmcal.controllers.gcode_words import (
     number,
     numbers,
     off_towers,
+    require_mm,
     require_positive,
     settings,
 )
@@ -60,6 +61,7 @@ def of_reprap(text: str, place: str = "M669") -> RotaryDelta:
     ValueError
         A number that is missing.
     """
+    require_mm(text, place, "M669", "M666")
     size, ends = settings(text, "M669", place), settings(text, "M666", place)
 
     def three(letter: str) -> tuple[float, ...]:

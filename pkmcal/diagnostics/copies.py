@@ -50,8 +50,8 @@ class Copied:
 def copies(equations: Equations) -> Iterator[Copied]:
     """Find them; readings of actuators alone may well occur twice."""
     earlier, start = list[tuple[str, int, set[bytes]]](), 0
-    for measured, pose in zip(equations.sets, equations.pose_of, strict=True):
-        rows = equations.rows[start : start + len(measured)]
+    for measured, pose in zip(equations.table.sets, equations.table.pose_of, strict=True):
+        rows = equations.table.rows[start : start + len(measured)]
         start += len(measured)
         if not measured.components:
             continue
@@ -61,7 +61,7 @@ def copies(equations: Equations) -> Iterator[Copied]:
             measured.values.reshape(len(measured), -1),
             repeats.targets(measured),
         ])  # fmt: skip
-        keys = {row.tobytes() for row in table} if len(equations.sets) > 1 else set()
+        keys = {row.tobytes() for row in table} if len(equations.table.sets) > 1 else set()
         for kind, first, others in earlier:
             if kind == measured.kind and len(keys) > _CHANCE and keys <= others:
                 yield Copied(tuple(rows.tolist()), (first,), whole=True)

@@ -115,7 +115,7 @@ def _alike(known: dict[str, Score], name: str, variance: float) -> Iterator[str]
 
 def _targets(fit: Fit) -> Iterator[tuple[str, list[BoolArray]]]:
     """Names of known targets, and their rows in each set."""
-    sets = fit.equations.datasets
+    sets = fit.equations.prediction.datasets
     places: list[FloatArray | None] = []
     for data in sets:
         given = [each.given for each in data.dependences() if _known_target(each)]
@@ -138,7 +138,7 @@ def _known_target(dependence: Dependence) -> bool:
 
 def _name(fit: Fit, place: FloatArray, rows: list[BoolArray]) -> str:
     """The name that a file has for it, or its place."""
-    for data, mine in zip(fit.equations.datasets, rows, strict=True):
+    for data, mine in zip(fit.equations.prediction.datasets, rows, strict=True):
         m = data.measured
         if mine.any() and m.target_names is not None and m.target_index is not None:
             return printable(m.target_names[m.target_index[int(mine.argmax())]])

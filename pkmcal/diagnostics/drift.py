@@ -116,13 +116,13 @@ def drift(fit: Fit, held: HeldOut, odd: Collection[int]) -> Drift | None:
     found = []
     equations = fit.equations
     apart = held.holdout_later is not None and not held.holdout_drawn
-    for i, data in enumerate(equations.datasets):
+    for i, data in enumerate(equations.prediction.datasets):
         parts = [(data, fit.end.residuals[i])]
         if held.holdout_later is not None and held.holdout_end is not None and held.holdout_drawn:
             parts += _alike(held, held.holdout_end, i)
         found.append(_tested(parts, odd))
     if apart and held.holdout_later is not None and held.holdout_end is not None:
-        for i in range(len(fit.equations.datasets)):
+        for i in range(len(fit.equations.prediction.datasets)):
             found += [
                 _tested([part], held.holdout_outliers) for part in _alike(held, held.holdout_end, i)
             ]

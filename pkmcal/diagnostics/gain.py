@@ -14,7 +14,7 @@ _GAIN = 0.9  # of the misfit that must not be left for a calibration to be worth
 
 def _little_gained(found: Solution) -> bool:
     sure = found.fit.uncertainty
-    if not sure.equations.unstated.any() and sure.covariance.scale <= RATIO:
+    if not sure.equations.blocks.unstated.any() and sure.covariance.scale <= RATIO:
         return False  # the residuals are what sigma says
     if found.lack_of_fit_chance > SIGNIFICANT:
         return False  # they are what repeats scatter
@@ -24,7 +24,7 @@ def _little_gained(found: Solution) -> bool:
 
 def _other_causes(found: Solution) -> str:
     """What else the misfit may come of where the calibration hardly lowered it."""
-    if not found.fit.uncertainty.equations.unstated.any():
+    if not found.fit.uncertainty.equations.blocks.unstated.any():
         return "numbers that are not free are wrong, or sigma is too small"
     if np.isfinite(found.lack_of_fit_chance):
         return "repeats scatter less, so numbers that are not free are wrong"

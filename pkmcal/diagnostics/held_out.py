@@ -84,7 +84,7 @@ def _fitted_again(found: Solution) -> int:
     sought = set(held)
     fitted = {
         key
-        for m in found.fit.equations.sets
+        for m in found.fit.equations.table.sets
         for row in (_commands(m) if sought else ())
         if (key := row.tobytes()) in sought
     }

@@ -62,7 +62,7 @@ def beyond_linear(estimate: Estimate, uncertainty: Uncertainty) -> Weak | None:
     least = CLEAR * chosen.robot.length
     if not np.linalg.norm(root, 2) > least:
         return None
-    weights = np.repeat(estimate.weights, equations.components)
+    weights = np.repeat(estimate.weights, equations.blocks.components)
     rises = []
     for draw in np.random.default_rng(0).normal(size=(_DRAWS, root.shape[1])):
         step = root @ draw

@@ -89,8 +89,8 @@ def _shrunk(found: Solution) -> tuple[float, ...]:
     Touches of a point, a line or a plane do not: a smaller machine makes all their misfits smaller.
     """
     fit = found.fit
-    kinds = {measured.kind for measured in fit.equations.sets}
-    pairs = zip(fit.equations.sets, fit.equations.pose_of, strict=True)
+    kinds = {measured.kind for measured in fit.equations.table.sets}
+    pairs = zip(fit.equations.table.sets, fit.equations.table.pose_of, strict=True)
     touching = [place for measured, place in pairs if measured.kind == "touch"]
     if not kinds <= _NO_LENGTH or not touching:
         return ()
@@ -129,9 +129,9 @@ def _out_of_stroke(found: Solution) -> tuple[OutOfStroke, ...]:
         i: (float(drive[out[:, i], i].min()), float(drive[out[:, i], i].max()))
         for i in np.flatnonzero(out.any(axis=0)).tolist()
     }
-    broken = np.asarray(out.any(axis=1))[np.concatenate(equations.pose_of)]
+    broken = np.asarray(out.any(axis=1))[np.concatenate(equations.table.pose_of)]
     return at_most_one(
-        OutOfStroke(tuple(equations.rows[broken].tolist()), limbs) if limbs else None
+        OutOfStroke(tuple(equations.table.rows[broken].tolist()), limbs) if limbs else None
     )
 
 
@@ -145,7 +145,7 @@ def _out_of_stroke_text(found: Solution, seen: OutOfStroke) -> str:
         )
     more = f" and {len(limbs) - 2} more limbs" if len(limbs) > 2 else ""
     return (
-        f"actuators out of stroke in {len(seen.rows)} of {len(found.fit.equations.rows)} rows"
+        f"actuators out of stroke in {len(seen.rows)} of {len(found.fit.equations.table.rows)} rows"
         f" (rows {first_rows(seen.rows, 10)}): {'; '.join(limbs[:2])}{more}; check units,"
         " signs and columns of the actuators, or the strokes in the robot file"
     )

@@ -122,7 +122,7 @@ def measuring_order(fit: Fit, odd: Collection[int]) -> MeasuringOrder | None:
         units=tuple(units[k] for k in read),
         chance=min(1.0, len(known) * course.chance),
         share=course.share,
-        jump=row_names(fit.equations.datasets, at),
+        jump=row_names(fit.equations.prediction.datasets, at),
         visits=len(course.values),
         series=visits.names[series] if len(visits.names) > 1 else "",
     )
@@ -143,13 +143,13 @@ class _Visits:
 
 def _visits(fit: Fit, odd: Collection[int]) -> _Visits:
     sure, equations = fit.uncertainty, fit.uncertainty.equations
-    series, names = _series(equations.datasets)
+    series, names = _series(equations.prediction.datasets)
     time = np.concatenate([
         data.rows.astype(float) if data.measured.time is None else data.measured.time
-        for data in equations.datasets
+        for data in equations.prediction.datasets
     ])  # fmt: skip
-    use = ~np.isin(equations.rows, list(odd))
-    order = np.lexsort((equations.rows, time, series))
+    use = ~np.isin(equations.table.rows, list(odd))
+    order = np.lexsort((equations.table.rows, time, series))
     order = order[use[order]]
     pose = sure.poses
     new = (np.diff(pose[order], prepend=-1) != 0) | (np.diff(series[order], prepend=-1) != 0)
@@ -168,7 +168,7 @@ def _visits(fit: Fit, odd: Collection[int]) -> _Visits:
     return _Visits(
         names=names,
         series=series[first],
-        row=equations.rows[first],
+        row=equations.table.rows[first],
         visit=visit[labels.row][mine][where],
         design=averaged(sure.fit.design),
         residual=averaged(sure.fit.residual[:, None])[:, 0],
@@ -196,7 +196,7 @@ def _series(datasets: Sequence[FitData]) -> tuple[IntArray, tuple[str, ...]]:
 
 def _components(fit: Fit) -> dict[str, str]:
     """What was read, of all sets, and its unit."""
-    sets = fit.uncertainty.equations.sets
+    sets = fit.uncertainty.equations.table.sets
     return {n: u for m in sets for n, u in zip(m.components, m.units, strict=True)}
 
 
@@ -205,7 +205,7 @@ def _by_component(fit: Fit) -> FloatArray:
     equations = fit.uncertainty.equations
     numbers = {n: k for k, n in enumerate(_components(fit))}
     parts = []
-    for m in equations.sets:
+    for m in equations.table.sets:
         one = np.eye(len(numbers))[[numbers[n] for n in m.components]]
         parts.append(np.tile(one, (len(m), 1, 1)))
     return equations.whitening.whiten(parts, fit.uncertainty.factors)

@@ -87,7 +87,7 @@ def moved(fit: Fit, later: Later, end: Evaluation) -> tuple[Moved, ...]:
     candidates = _candidates(chosen.names)
     if not solved.any() or not candidates:
         return ()
-    use = np.repeat(solved, second.components)
+    use = np.repeat(solved, second.blocks.components)
     whole = second.by_parameters(evaluation, noise)[use] * later.parameters.scale
     # the second session's own numbers follow those of the fit
     jacobian = np.hstack([later.by_fitted(whole, len(chosen)), whole[:, later.own]])

@@ -20,7 +20,7 @@ _CAUCHY = Remedy("loss", "cauchy")
 def _few_spare(found: Solution) -> tuple[float, ...]:
     """Spare equations where they are few, and the noise has to be estimated from them."""
     sure = found.fit.uncertainty
-    if sure.fit.freedom >= FEW or not sure.equations.unstated.any():
+    if sure.fit.freedom >= FEW or not sure.equations.blocks.unstated.any():
         return ()
     # of mixtures `noise-unknown` names the groups, and `too-few-rows` says that nothing is left
     said_elsewhere = not sure.known and (sure.mixed or found.dof < LEAST_FREEDOM)
@@ -28,7 +28,7 @@ def _few_spare(found: Solution) -> tuple[float, ...]:
 
 
 def _few_spare_text(found: Solution, freedom: float) -> str:
-    heights = all(m.kind == "height" for m in found.fit.equations.sets)
+    heights = all(m.kind == "height" for m in found.fit.equations.table.sets)
     more = "probe 20 points or more" if heights else "measure more poses"
     if not found.fit.uncertainty.known:
         return (
@@ -92,7 +92,7 @@ def _unlike_sets(found: Solution) -> tuple[dict[int, float], ...]:
 
 
 def _unlike_sets_text(found: Solution, ratios: dict[int, float]) -> str:
-    sets = found.fit.equations.sets
+    sets = found.fit.equations.table.sets
     parts = " and ".join(
         f"{'touch_distances' if sets[i].kind == 'touch-distance' else f'measurements {i + 1}'} are"
         f" {ratio:.2g}"
@@ -108,7 +108,7 @@ def _unlike_sets_text(found: Solution, ratios: dict[int, float]) -> str:
 def _unestimated(found: Solution) -> tuple[tuple[str, ...], ...]:
     """Groups of equations the noise of which is neither stated nor shown."""
     sure, equations = found.fit.uncertainty, found.fit.equations
-    names = [f"of measurements {i + 1}" for i in range(len(equations.sets))]
+    names = [f"of measurements {i + 1}" for i in range(len(equations.table.sets))]
     names += ["of the load cells"] if equations.closures.cells else []
     if not (sure.mixed and sure.unknown.any()):
         return ()
@@ -123,7 +123,7 @@ def _unestimated_text(found: Solution, groups: tuple[str, ...]) -> str:
 
 
 def _stated(found: Solution) -> bool:
-    return not found.fit.uncertainty.equations.unstated.any()
+    return not found.fit.uncertainty.equations.blocks.unstated.any()
 
 
 def _widened(found: Solution) -> tuple[float, ...]:

@@ -61,7 +61,7 @@ def robust_check(fit: Fit) -> RobustCheck | None:
     """
     equations, estimate = fit.uncertainty.equations, fit.estimate
     linear = fit.uncertainty.fit
-    ratio = robust_ratio(linear.design, linear.residual, equations.components)
+    ratio = robust_ratio(linear.design, linear.residual, equations.blocks.components)
     if not ratio > _SUSPECT or fit.uncertainty.rounded:
         return None
     drawn = _drawn(fit)
@@ -75,24 +75,26 @@ def robust_check(fit: Fit) -> RobustCheck | None:
     except ValueError:
         return None
     p = robust.state.fitted.rank
-    m, own = int(few.components.sum()), int(equations.components.sum())
+    m, own = int(few.blocks.components.sum()), int(equations.blocks.components.sum())
     if m <= p or own <= p:
         return None
     # both in units of the same noise
     noise = estimate.state.noise
-    of_sets = np.concatenate([noise[[i for _, i in drawn]], noise[len(equations.sets) :]])
+    of_sets = np.concatenate([noise[[i for _, i in drawn]], noise[len(equations.table.sets) :]])
     plain = equations.residual(estimate.evaluation, noise)
     squares = few.blocks.squares(few.residual(robust.evaluation, of_sets))
-    scale = median_ratio(squares, few.components) * m / (m - p)
+    scale = median_ratio(squares, few.blocks.components) * m / (m - p)
     named = outlying(estimator, robust)
     if not scale > 0:
         return None
     ratio = float(np.sqrt(plain @ plain / (own - p) / scale))
-    by_chance = ratio_by_chance(linear.design, equations.components) if ratio > DISAGREES else 1.0
+    by_chance = (
+        ratio_by_chance(linear.design, equations.blocks.components) if ratio > DISAGREES else 1.0
+    )
     return RobustCheck(
         ratio=ratio,
         by_chance=by_chance,
-        rows=tuple(few.rows[named].tolist()),
+        rows=tuple(few.table.rows[named].tolist()),
         rms=_rms_of_others(few, commanded, robust.evaluation, named),
     )
 
@@ -103,7 +105,7 @@ def _rms_of_others(
     """How far off the rows are that are not named (N,), mm; closures where nothing was read."""
     if not few.whitening.any_read:
         poses = np.ones(len(there.pose), dtype=bool)
-        poses[np.concatenate(few.pose_of)[named]] = False
+        poses[np.concatenate(few.table.pose_of)[named]] = False
         return misfits.closure_rms(few, there, poses)
     off = misfits.distances(few, commanded.at(there.theta, near=there))[~named]
     return rms(off[np.isfinite(off)])
@@ -115,11 +117,11 @@ def _drawn(fit: Fit) -> list[tuple[FitData, int]]:
     pose = fit.uncertainty.poses
     count = int(pose.max()) + 1
     if count <= _MOST:
-        return [(data, i) for i, data in enumerate(equations.datasets)]
+        return [(data, i) for i, data in enumerate(equations.prediction.datasets)]
     chosen = np.isin(pose, np.random.default_rng(0).permutation(count)[:_MOST])
     drawn = []
-    for i, data in enumerate(equations.datasets):
-        mine = np.flatnonzero(chosen[equations.set_of == i])
+    for i, data in enumerate(equations.prediction.datasets):
+        mine = np.flatnonzero(chosen[equations.table.set_of == i])
         if len(mine):
             drawn.append((data.select(mine), i))
     return drawn

@@ -34,8 +34,9 @@ def _disagreement(found: Solution, robust: RobustCheck) -> str:
         )
     rows = "row disagrees" if count == 1 else "rows disagree"
     own = found.closure_rms if np.isnan(found.rms) else found.rms
+    names = row_names(found.fit.equations.prediction.datasets, robust.rows)
     return (
-        f"{count} {rows} with the rest: {row_names(found.fit.equations.datasets, robust.rows)};"
+        f"{count} {rows} with the rest: {names};"
         f" a robust fit leaves {robust.rms:.3g} mm in the others, this one {own:.3g} mm in all:"
         f" leave {'it' if count == 1 else 'them'} out with {_OUTLIERS}, or fit with {_CAUCHY}"
     )
@@ -55,7 +56,7 @@ def _much_left(found: Solution) -> tuple[tuple[float, float], ...]:
 
 
 def _much_left_text(found: Solution, sizes: tuple[float, float]) -> str:
-    likely = likely_row_errors(found.fit.equations.datasets, found.fit.parameters)
+    likely = likely_row_errors(found.fit.equations.prediction.datasets, found.fit.parameters)
     cause = (
         "; ".join(likely) or "check that robot file and measurements belong together, row by row"
     )

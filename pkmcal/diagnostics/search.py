@@ -17,8 +17,8 @@ def _nothing_determined(found: Solution) -> bool:
 def _too_few(found: Solution) -> tuple[str, ...]:
     """What there is too little of: poses, equations, or freedom; the sentence on it."""
     equations = found.fit.uncertainty.equations
-    n, count = len(equations.parameters), int(equations.components.sum())
-    if len(equations.actuators) == 1 and len(equations.rows) > 1:
+    n, count = len(equations.parameters), int(equations.blocks.components.sum())
+    if len(equations.table.actuators) == 1 and len(equations.table.rows) > 1:
         return ("all rows have the same actuators: measure different poses",)
     if count < n and not len(found.fit.estimate.prior):
         return (

@@ -189,7 +189,7 @@ def _unit_errors(found: Solution) -> list[str]:
     if not poor and not far_numbers(found):
         return []
     equations = found.fit.uncertainty.equations
-    return likely_unit_errors(equations.datasets, equations.parameters, found.fit.start)
+    return likely_unit_errors(equations.prediction.datasets, equations.parameters, found.fit.start)
 
 
 CHECKS = (

@@ -14,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray, IntArray
+from pkmcal.arrays import BoolArray, FloatArray
 from pkmcal.core.library import STATUS
 from pkmcal.estimation.elimination import Shares
 from pkmcal.estimation.evaluation import Cache, Evaluation
@@ -34,7 +34,6 @@ from pkmcal.estimation.session_machines import (
 )
 from pkmcal.estimation.whitening import Whitening
 from pkmcal.kinematics.drive_state import DriveState
-from pkmcal.measurements.measurements import Measurements
 from pkmcal.result import failed_rows
 
 _TOGETHER = 16384  # rows whose readings are kept with their derivatives
@@ -107,68 +106,30 @@ class Equations:
         return self.prediction.parameters
 
     @property
-    def datasets(self) -> tuple[FitData, ...]:
-        """The rows to fit."""
-        return self.prediction.datasets
-
-    @property
     def table(self) -> PoseTable:
         """The rows and their poses."""
         return self.prediction.table
 
-    @property
-    def sets(self) -> tuple[Measurements, ...]:
-        """The rows of each set."""
-        return self.table.sets
-
-    @property
-    def rows(self) -> IntArray:
-        """Numbers (N,) of the rows in what the user gave."""
-        return self.table.rows
-
-    @property
-    def set_of(self) -> IntArray:
-        """Set of each row (N,)."""
-        return self.table.set_of
-
-    @property
-    def pose_of(self) -> tuple[IntArray, ...]:
-        """Pose of each row of each set."""
-        return self.table.pose_of
-
-    @property
-    def actuators(self) -> FloatArray:
-        """What the actuators read at each pose (K, n)."""
-        return self.table.actuators
-
-    @property
-    def components(self) -> IntArray:
-        """Equations of each block (B,)."""
-        return self.blocks.components
-
-    @property
-    def unstated(self) -> BoolArray:
-        """Whether the noise is not known, of each group of equations (G,)."""
-        return self.blocks.unstated
-
     @cached_property
     def arcs(self) -> tuple[float, ...]:
         """What takes the misfit of each set to mm: where angles alone were read, the length."""
-        return tuple(m.instrument.arc(m, self.parameters.robot.length) for m in self.sets)
+        return tuple(m.instrument.arc(m, self.parameters.robot.length) for m in self.table.sets)
 
     @property
     def size(self) -> float:
         """The largest number that the equations are made of, mm."""
-        largest = np.abs(self.prediction.guess.pose).max(), np.abs(self.actuators).max()
+        largest = np.abs(self.prediction.guess.pose).max(), np.abs(self.table.actuators).max()
         return float(max(self.parameters.robot.length, *largest))
 
     @property
     def sigma_stated(self) -> bool:
         """Whether any noise is stated, of what was read or of the actuators."""
         cells = self.table.cells
-        of_actuators = isinstance(self.blocks, PoseBlocks) and not self.unstated[-1]
+        of_actuators = isinstance(self.blocks, PoseBlocks) and not self.blocks.unstated[-1]
         of_cells = cells is not None and cells.sigma is not None
-        of_read = [m.sigma is not None and bool(np.isfinite(m.values).any()) for m in self.sets]
+        of_read = [
+            m.sigma is not None and bool(np.isfinite(m.values).any()) for m in self.table.sets
+        ]
         return bool(of_actuators) or of_cells or any(of_read)
 
     @property
@@ -191,7 +152,7 @@ class Equations:
         """The equations of poses that follow from the actuators as they read."""
         if not self.closures.unknowns:
             return self
-        unstated = self.unstated[: len(self.sets)]
+        unstated = self.blocks.unstated[: len(self.table.sets)]
         return replace(
             self,
             closures=exact_closures(self.table.poses_of_machine, self.without_slack),
@@ -221,10 +182,10 @@ class Equations:
         needed = self.system.readings_off(evaluation)
         slack = np.zeros(needed.shape, dtype=bool)
         slack[tuple(np.array(cells, dtype=np.intp).reshape(-1, 2).T)] = True
-        without_slack = self.actuators.copy()
+        without_slack = self.table.actuators.copy()
         for pose, cell in zip(*np.nonzero(slack), strict=True):
             without_slack[pose, self.closures.actuators[cell]] += needed[pose, cell]
-        blocks = pose_blocks(self.table, self.closures, slack, self.unstated, self.size)
+        blocks = pose_blocks(self.table, self.closures, slack, self.blocks.unstated, self.size)
         return replace(self, blocks=blocks, without_slack=without_slack)
 
     def reweighted(self, deviations: Sequence[FloatArray]) -> Equations:
@@ -245,11 +206,11 @@ class Equations:
         machines, cache = self._machines(theta), Cache()
         states = self._states_ahead(machines, theta, near)
         if self.system is not None:
-            factors = np.ones(len(self.unstated)) if noise is None else noise
+            factors = np.ones(len(self.blocks.unstated)) if noise is None else noise
             states, system = self.system.best(machines, states, theta, factors)
             cache["system"] = self.system, factors, system
         predicted = self.prediction.at(states.pose, theta)
-        if len(self.rows) <= _TOGETHER:
+        if len(self.table.rows) <= _TOGETHER:
             cache["predicted"] = self.prediction, predicted
         return Evaluation(
             theta,
@@ -343,7 +304,7 @@ class Equations:
 
     def by_parameters(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
         """Derivative (M, n) of what is predicted by the parameters, whitened and reduced."""
-        found = np.empty((int(self.components.sum()), len(self.parameters)))
+        found = np.empty((int(self.blocks.components.sum()), len(self.parameters)))
         for _, equations, by_parameters in self.batches(evaluation, noise):
             found[equations] = by_parameters
         return found
@@ -352,7 +313,7 @@ class Equations:
         """`by_parameters` in batches of whole blocks; in one where poses have unknowns."""
         if self.system is not None:
             found = self.system.by_parameters(evaluation, noise)
-            yield slice(0, len(self.components)), slice(0, len(found)), found
+            yield slice(0, len(self.blocks.components)), slice(0, len(found)), found
             return
         blocks = equations = slice(0, 0)
         for batch, parts in self.prediction.derivatives(evaluation, self.closures):
@@ -383,9 +344,9 @@ class Equations:
         """
         if self.system is not None:
             return self.system.by_groups(evaluation, noise, weights, residual, leverage)
-        count = len(self.unstated)
-        group = np.repeat(self.blocks.family_of_block, self.components)
-        every = np.repeat(weights, self.components)
+        count = len(self.blocks.unstated)
+        group = np.repeat(self.blocks.family_of_block, self.blocks.components)
+        every = np.repeat(weights, self.blocks.components)
         free = every - np.einsum("ij,ij->i", leverage, leverage)
         freedom = np.bincount(group, free, count).astype(np.float64)
         squares = np.bincount(group, residual**2, count).astype(np.float64)
@@ -393,5 +354,5 @@ class Equations:
 
     def failures(self, evaluation: Evaluation) -> str:
         """Say which rows failed and why; empty where the forward kinematics solved all."""
-        status = np.concatenate([evaluation.status[place] for place in self.pose_of])
-        return failed_rows(status, STATUS, self.rows, most=10)
+        status = np.concatenate([evaluation.status[place] for place in self.table.pose_of])
+        return failed_rows(status, STATUS, self.table.rows, most=10)

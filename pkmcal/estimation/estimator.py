@@ -56,7 +56,7 @@ class Estimator:
         self.search = Search(equations, start)
         self.scale = self.search.scale
         self._priors = len(self.search.prior(start.theta))
-        self.unstated = equations.unstated
+        self.unstated = equations.blocks.unstated
 
     @property
     def least_freedom(self) -> float:
@@ -127,7 +127,7 @@ class Estimator:
 
     def _loss(self, name: LossName, width: FloatArray) -> Loss:
         of_units = width[self.equations.blocks.family_of_block]
-        return Loss(name, self.equations.components, of_units)
+        return Loss(name, self.equations.blocks.components, of_units)
 
     def _first_noise(self) -> FloatArray:
         """1 mm where it is not stated; with a prior what the data alone show at the start.
@@ -155,7 +155,7 @@ class Estimator:
         """
         taken = column_basis(jacobian)
         left = residual - taken @ (taken.T @ residual)
-        every = np.ones(len(self.equations.components))
+        every = np.ones(len(self.equations.blocks.components))
         shares = self.equations.by_groups(evaluation, noise, every, left, taken)
         freedom = shares[1]
         few = (freedom[self.unstated] < LEAST_FREEDOM).any()
@@ -175,7 +175,10 @@ class Estimator:
 
     def _medians(self, residual: FloatArray) -> FloatArray:
         """Variance (F,) that whitened residuals (M,) of each family show by their median."""
-        squares, components = self.equations.blocks.squares(residual), self.equations.components
+        squares, components = (
+            self.equations.blocks.squares(residual),
+            self.equations.blocks.components,
+        )
         family_of = self.equations.blocks.family_of_block
         return np.array([
             median_ratio(squares[family_of == f], components[family_of == f])
@@ -298,7 +301,7 @@ class Estimator:
             variance = together = float(squares[mine].sum()) / left
             if medians is not None:
                 of_family = self.equations.blocks.family_of_block == f
-                count = float(self.equations.components[of_family].sum())
+                count = float(self.equations.blocks.components[of_family].sum())
                 variance = float(medians[f]) * count / left
             of_families[f] = np.sqrt(variance)
             known = mine[self.unstated[mine] & (freedom[mine] >= self.least_freedom)]
@@ -338,7 +341,7 @@ class Estimator:
         """
         if self.equations.closures.unknowns:
             return self.search.triangle(evaluation, np.ones(len(self.unstated)))
-        arcs = [m.instrument.mm(m, self.start.robot.length) for m in self.equations.sets]
+        arcs = [m.instrument.mm(m, self.start.robot.length) for m in self.equations.table.sets]
         factor = np.zeros((0, len(self.scale)))
         for _, parts in self.equations.prediction.derivatives(evaluation, self.equations.closures):
             for i, rows, part in parts:
@@ -352,7 +355,7 @@ class Estimator:
         design = self.search.own_jacobian(evaluation, state.noise)
         residual = self.equations.residual(evaluation, state.noise)
         weights = state.loss.weights(residual)
-        root = np.sqrt(np.repeat(weights, self.equations.components))
+        root = np.sqrt(np.repeat(weights, self.equations.blocks.components))
         linear = self.loss == "linear"
         factor = triangle(design)
         weighted = factor if linear else triangle(root[:, None] * design)

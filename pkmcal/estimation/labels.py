@@ -45,10 +45,10 @@ def poses_of_rows(equations: Equations) -> IntArray:
 
     Rows at the same actuators are one pose in all sets.
     """
-    pose = equations.table.command_of_pose[np.concatenate(equations.pose_of)]
-    for k, measured in enumerate(equations.sets):
+    pose = equations.table.command_of_pose[np.concatenate(equations.table.pose_of)]
+    for k, measured in enumerate(equations.table.sets):
         if measured.group is not None:
-            pose[equations.set_of == k] = measured.pose_index + pose.max() + 1
+            pose[equations.table.set_of == k] = measured.pose_index + pose.max() + 1
     return numbered(pose)
 
 
@@ -61,7 +61,7 @@ def _of_readings(equations: Equations) -> Labels:
     names: dict[str, int] = {}
     targets, components, lengths, rows = [], [], [], []
     first = 0
-    for m in equations.sets:
+    for m in equations.table.sets:
         targets.append(np.repeat(repeats.targets(m), len(m.components)))
         numbers = [names.setdefault(name, len(names)) for name in m.components]
         components.append(np.tile(np.array(numbers, dtype=np.intp), len(m)))
@@ -72,7 +72,7 @@ def _of_readings(equations: Equations) -> Labels:
     read = equations.whitening.present
     row = np.concatenate(rows)[read]
     return Labels(
-        set_of=equations.set_of[row],
+        set_of=equations.table.set_of[row],
         row=row,
         pose=poses_of_rows(equations)[row],
         target=np.concatenate(targets)[read],
@@ -82,7 +82,7 @@ def _of_readings(equations: Equations) -> Labels:
 
 
 def _of_mixtures(equations: Equations) -> Labels:
-    unit = np.repeat(np.arange(len(equations.components)), equations.components)
+    unit = np.repeat(np.arange(len(equations.blocks.components)), equations.blocks.components)
     pose = _poses_of_units(equations)[unit]
     order = np.argsort(pose, kind="stable")
     count = np.bincount(pose)

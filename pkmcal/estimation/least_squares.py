@@ -89,12 +89,12 @@ class Search:
         lower, upper = ((end - start.theta)[self._found] / self.scale for end in parameters.bounds)
         bounded = bool(np.isfinite([lower, upper]).any())
         self._bounds = (lower, upper) if bounded else None
-        self._equations = int(equations.components.sum())
+        self._equations = int(equations.blocks.components.sum())
         self._cache: dict[str, tuple[Evaluation, FloatArray, FloatArray]] = {}  # a Jacobian
 
     def begin(self) -> Trail:
         """The trail of a search that has not begun."""
-        u, ones = np.zeros(len(self.scale)), np.ones(len(self.equations.unstated))
+        u, ones = np.zeros(len(self.scale)), np.ones(len(self.equations.blocks.unstated))
         return Trail(self.start, u, ones, self.start)
 
     def at(self, trail: Trail, u: FloatArray, noise: FloatArray) -> Trail:
@@ -168,7 +168,11 @@ class Search:
         """`own_jacobian` in batches, finite or not."""
         last = self._cache.pop("jacobian", None)
         if last is not None and last[0] is evaluation and _same(last[1], noise):
-            yield slice(0, len(self.equations.components)), slice(0, self._equations), last[2]
+            yield (
+                slice(0, len(self.equations.blocks.components)),
+                slice(0, self._equations),
+                last[2],
+            )
             return
         del last
         for blocks, some, by_parameters in self.equations.batches(evaluation, noise):
@@ -187,7 +191,7 @@ class Search:
         `noise` (G,) is as in `Whitening`; `pins` (d, n) are rows that hold the combinations that
         measurements and prior do not identify.
         """
-        everything = np.zeros(len(self.equations.components), dtype=bool)
+        everything = np.zeros(len(self.equations.blocks.components), dtype=bool)
         trail, straight, cost, barred = self._minimum(trail, u, noise, loss, pins, everything)
         if not barred.any() or barred.all():
             return straight, trail
@@ -216,7 +220,7 @@ class Search:
         Those are the blocks (B,) of rows that some step could not reach.
         """
         equations = self.equations
-        without = np.repeat(aside, equations.components)
+        without = np.repeat(aside, equations.blocks.components)
         last: tuple[Evaluation, FloatArray] | None = None
         refused = np.zeros_like(aside)
 

@@ -21,7 +21,9 @@ def worst_readings(equations: Equations, pose: FloatArray, theta: FloatArray) ->
     worst = np.full(len(pose), np.nan)
     prediction, length = equations.prediction, equations.parameters.robot.length
     residuals = prediction.residuals(prediction.at(pose, theta))
-    for m, place, residual in zip(equations.sets, equations.pose_of, residuals, strict=True):
+    for m, place, residual in zip(
+        equations.table.sets, equations.table.pose_of, residuals, strict=True
+    ):
         read = np.isfinite(m.values.reshape(residual.shape))
         known = np.where(read, residual, 0.0)
         off = np.linalg.norm(known * m.instrument.mm(m, length), axis=1)
@@ -35,7 +37,7 @@ def distances(equations: Equations, evaluation: Evaluation) -> FloatArray:
     """How far off each measured point is, mm, in the order of the sets."""
     return np.concatenate([
         m.instrument.distance_per_point(of_read(m, r), m, equations.parameters.robot.length)
-        for m, r in zip(equations.sets, evaluation.residuals, strict=True)
+        for m, r in zip(equations.table.sets, evaluation.residuals, strict=True)
     ])  # fmt: skip
 
 
@@ -68,7 +70,7 @@ def worst_closures(equations: Equations, evaluation: Evaluation) -> FloatArray:
     """How far off the worst closure at each pose is, mm (K,); NaN where they hold."""
     system = equations.system
     if system is None:
-        return np.full(len(equations.actuators), np.nan)
+        return np.full(len(equations.table.actuators), np.nan)
     off: FloatArray = np.abs(_closures_off(system, evaluation))
     off[system.blocks.slack[:, : off.shape[1]]] = 0.0
     worst: FloatArray = off.max(axis=1)
@@ -94,11 +96,11 @@ def rounding(equations: Equations, noise: FloatArray) -> float:
     """Length of the whitened rounding errors of what is predicted, for noise (G,)."""
     length, readings, sigma = equations.parameters.robot.length, 0.0, equations.closures.sigma
     if equations.system is None or equations.whitening.any_read:
-        parts = [_rounded(m, length) for m in equations.sets]
+        parts = [_rounded(m, length) for m in equations.table.sets]
         readings = float(np.linalg.norm(equations.whitening.whitened(parts, noise)))
     if equations.system is None or sigma is None:
         return readings
-    size = _ROUNDING * float(np.abs(equations.actuators).max())
+    size = _ROUNDING * float(np.abs(equations.table.actuators).max())
     whitened = size / (noise[equations.system.blocks.groups] * sigma)
     return float(np.hypot(readings, np.linalg.norm(whitened)))
 

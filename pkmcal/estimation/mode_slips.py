@@ -51,7 +51,7 @@ def start_in_modes(
 def in_other_modes(equations: Equations, evaluation: Evaluation) -> list[str]:
     """Say which rows fit another assembly mode than the one they were solved in."""
     better, _ = _better(equations, evaluation)
-    rows = equations.rows[np.isin(np.concatenate(equations.pose_of), better)].tolist()
+    rows = equations.table.rows[np.isin(np.concatenate(equations.table.pose_of), better)].tolist()
     if not rows:
         return []
     many = f"{len(rows)} rows fit" if len(rows) > 1 else "1 row fits"
@@ -79,7 +79,11 @@ def _better(equations: Equations, evaluation: Evaluation) -> tuple[IntArray, Flo
     least, best = np.where(solved, misfit, np.inf), pose.copy()
     modes = [
         _modes(
-            instance("robot", machines.at(k), Robot), equations.actuators, pose, k, misfit <= limit
+            instance("robot", machines.at(k), Robot),
+            equations.table.actuators,
+            pose,
+            k,
+            misfit <= limit,
         )
         for k in gross.tolist()
     ]

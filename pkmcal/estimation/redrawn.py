@@ -26,10 +26,10 @@ def redrawn(
     errors, closures = reduced, equations.closures
     if equations.system is not None:
         closures, errors = equations.system.redrawn(at, noise, reduced)
-    residuals = tuple(equations.whitening.unwhiten(errors, noise[: len(equations.sets)]))
+    residuals = tuple(equations.whitening.unwhiten(errors, noise[: len(equations.table.sets)]))
     sets = tuple(
         replace(m, values=m.instrument.corrected(values, residual).reshape(m.values.shape))
-        for m, values, residual in zip(equations.sets, at.predicted, residuals, strict=True)
+        for m, values, residual in zip(equations.table.sets, at.predicted, residuals, strict=True)
     )
     parameters = replace(equations.parameters, start=prior_centre, drawn=drawn)
     prediction = replace(

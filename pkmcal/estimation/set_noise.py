@@ -25,7 +25,7 @@ def slipped(estimator: Estimator, estimate: Estimate) -> FloatArray:
     all sets slipped alike, for robust losses, and where equations are mixtures of readings.
     """
     equations = estimator.equations
-    ratios = np.ones(len(equations.sets))
+    ratios = np.ones(len(equations.table.sets))
     if equations.closures.unknowns or estimator.loss != "linear":
         return ratios
     squares, freedom = (part[: len(ratios)] for part in estimate.shares[:2])
@@ -33,10 +33,10 @@ def slipped(estimator: Estimator, estimate: Estimate) -> FloatArray:
     common = 1.0 if unstated.any() else float(squares.sum() / max(freedom.sum(), 1e-9))
     if not common > 0.0:
         return ratios  # no residual at all
-    rows, set_of = equations.blocks.squares(estimate.residual), equations.set_of
+    rows, set_of = equations.blocks.squares(estimate.residual), equations.table.set_of
     for i in np.flatnonzero(~unstated & (freedom >= FEW)):
         above = chi2_tail(float(squares[i]) / common, float(freedom[i]))
-        components = equations.components[set_of == i]
+        components = equations.blocks.components[set_of == i]
         median = median_ratio(rows[set_of == i], components) * components.sum() / freedom[i]
         half = float(np.sqrt(median / common))  # of the rows: outliers are no slip
         if min(above, 1.0 - above) < _CHANCE / 2.0 and apart(half):

@@ -138,12 +138,12 @@ class Uncertainty:
     @cached_property
     def noises(self) -> tuple[Noise, ...]:
         """Variances in mm² of a length of each set; NaN where nothing shows them."""
-        return tuple(self._noise(i) for i in range(len(self.equations.sets)))
+        return tuple(self._noise(i) for i in range(len(self.equations.table.sets)))
 
     @cached_property
     def excess(self) -> Noise:
         """Variances of an equation in units of what it was whitened by."""
-        if self.equations.unstated.any() or self.fit.freedom >= FEW:
+        if self.equations.blocks.unstated.any() or self.fit.freedom >= FEW:
             sandwich = self.covariance.sandwich
             return noise(sandwich.residual, sandwich.retained, self.fit.key)
         return 1.0, 0.0
@@ -152,7 +152,7 @@ class Uncertainty:
         stated = self.stated_variances(i)
         if self.mixed:
             own = float(self.factors[i] ** 2 if stated is None else stated.mean())
-            shown = self.equations.sets[i].components and not self.unknown[i]
+            shown = self.equations.table.sets[i].components and not self.unknown[i]
             return own * self.excess[0] if shown else float("nan"), 0.0
         if stated is not None and self.fit.freedom < FEW:
             return float(stated.mean()), 0.0
@@ -162,7 +162,7 @@ class Uncertainty:
 
     def stated_variances(self, i: int) -> FloatArray | None:
         """`stated_variances` of set `i`, of angles that were read alone as arcs."""
-        stated = stated_variances(self.equations.sets[i])
+        stated = stated_variances(self.equations.table.sets[i])
         return None if stated is None else self.equations.arcs[i] ** 2 * stated
 
     @cached_property
@@ -184,7 +184,7 @@ class Uncertainty:
             return joined([])
         values = self.in_units(self.fit.residual) if plain else self.fit.residual
         parts = []
-        for i in range(len(self.equations.sets)):
+        for i in range(len(self.equations.table.sets)):
             mine = self.lengths_of(i) if plain else self.labels.set_of == i
             leverage = float(self.fit.leverage[mine].sum())
             if mine.any():
@@ -211,7 +211,11 @@ def uncertainty(
     named, fit = solution
     chosen = equations.parameters
     rates = chosen.reported_rates(estimate.evaluation.theta) * chosen.scale
-    if rule == "auto" and equations.closures.unknowns and fit.clusters < len(equations.components):
+    if (
+        rule == "auto"
+        and equations.closures.unknowns
+        and fit.clusters < len(equations.blocks.components)
+    ):
         rule = "cluster"  # no two mixtures can be compared to see whether they share an error
     slips = slipped(estimator, estimate)
     if rule == "auto" and (slips != 1.0).any():
@@ -244,7 +248,7 @@ def solved(estimator: Estimator, estimate: Estimate) -> LinearModel:
     if estimator.loss != "linear":
         residual, _, _ = pseudo_residuals(
             residual,
-            estimator.equations.components,
+            estimator.equations.blocks.components,
             estimate.weights,
             state.loss.decline(residual),
             state.determined.rank,
@@ -280,7 +284,7 @@ def unlike_components(
     where equations are mixtures.
     """
     equations = estimator.equations
-    several = any(len(m.components) > 1 for m in equations.sets)
+    several = any(len(m.components) > 1 for m in equations.table.sets)
     if equations.closures.unknowns:
         return None
     if estimator.loss != "linear" or not estimator.unstated.all() or not several:
@@ -288,7 +292,7 @@ def unlike_components(
     named, fit = solution
     if shared_error_score(fit) > SHARED:
         return None
-    every = [np.tile(np.arange(len(m.components)), len(m)) for m in equations.sets]
+    every = [np.tile(np.arange(len(m.components)), len(m)) for m in equations.table.sets]
     place = np.concatenate(every)[equations.whitening.present]
     schemes = (np.zeros(6), [0, 0, 0, 1, 1, 1], [0, 0, 1, 2, 2, 2], np.arange(6))
     candidates = [
@@ -297,7 +301,7 @@ def unlike_components(
     found = told_apart(fit, candidates, _prior_residual(estimator, estimate))
     if found is None:
         return None
-    deviations = [np.ones(len(m.components)) for m in equations.sets]
+    deviations = [np.ones(len(m.components)) for m in equations.table.sets]
     of_equation = np.sqrt(found.variances)[found.classes]
     for i, k, deviation in zip(named.set_of, place, of_equation, strict=True):
         deviations[i][k] = deviation

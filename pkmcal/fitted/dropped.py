@@ -91,7 +91,7 @@ def outlying(estimator: Estimator, estimate: Estimate) -> BoolArray:
     odd = outliers(
         estimate.residual,
         estimate.design[:, :fitted],
-        equations.components,
+        equations.blocks.components,
         estimate.weights,
         estimate.prior @ estimate.half[:, :fitted],
     )
@@ -103,4 +103,4 @@ def robust_outliers(
 ) -> tuple[int, ...]:
     """Numbers of the rows that a robust fit from this start finds outlying."""
     estimator = estimator_at(equations, commanded, start, "cauchy")
-    return tuple(equations.rows[outlying(estimator, estimator.solve())].tolist())
+    return tuple(equations.table.rows[outlying(estimator, estimator.solve())].tolist())

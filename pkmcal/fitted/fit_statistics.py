@@ -97,7 +97,9 @@ def identifiability(estimator: Estimator, estimate: Estimate) -> dict[str, Any]:
         ),
         "gauges": names,
         "observability": observability(
-            estimator.scaled_triangle(estimate.evaluation), len(equations.actuators), measured.rank
+            estimator.scaled_triangle(estimate.evaluation),
+            len(equations.table.actuators),
+            measured.rank,
         ),
     }
 
@@ -115,15 +117,15 @@ def misfit(
     start, end = commanded
     equations, state = estimator.equations, estimate.state
     prior = equations.parameters.prior_left(estimate.evaluation.theta)
-    dof = float(estimate.weights @ equations.components) + len(prior) - state.fitted.rank
-    squares = np.repeat(estimate.weights, equations.components) @ estimate.residual**2
+    dof = float(estimate.weights @ equations.blocks.components) + len(prior) - state.fitted.rank
+    squares = np.repeat(estimate.weights, equations.blocks.components) @ estimate.residual**2
     stated = equations.sigma_stated and dof > 0
     split = uncertainty.noises
     shown = np.where(estimator.unstated & ~uncertainty.unknown, state.noise, np.nan)
     deviations = equations.whitening.deviations
     by_component = tuple(
         tuple((sigma * relative / m.instrument.mm(m, estimator.start.robot.length)).tolist())
-        for m, relative, sigma in zip(equations.sets, deviations, shown, strict=False)
+        for m, relative, sigma in zip(equations.table.sets, deviations, shown, strict=False)
     )
     named = outlying(estimator, estimate)
     before, after = (distances(misfits.distances(equations, each), named) for each in (start, end))
@@ -142,13 +144,13 @@ def misfit(
         "dof": dof,
         "noise": tuple(rms(np.array(each[:3])) for each in by_component),
         "component_noise": by_component,
-        "components": tuple(m.components for m in equations.sets),
+        "components": tuple(m.components for m in equations.table.sets),
         "told_apart": any((relative != 1.0).any() for relative in deviations),
         "reading_noise": tuple(float(np.sqrt(total - shared)) for total, shared in split),
         "pose_noise": tuple(float(np.sqrt(shared)) for _, shared in split),
         "residuals": end.residuals,
-        "rows": equations.rows,
-        "outliers": tuple(equations.rows[named].tolist()),
+        "rows": equations.table.rows,
+        "outliers": tuple(equations.table.rows[named].tolist()),
         "distances_before": before,
         "distances": after,
     }

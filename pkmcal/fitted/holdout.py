@@ -158,7 +158,7 @@ def evaluate(
     named = labels(equations)
     points = _points(rows, equations, after, named, own, uncertainty)
     row = named.row[named.length]
-    count = len(equations.rows)
+    count = len(equations.table.rows)
     off_before, off = (misfits.distances(equations, each) for each in (before, after))
     good = np.isfinite(off)
     expected = np.bincount(row, points.own + points.by_fit(uncertainty), count)
@@ -174,8 +174,8 @@ def evaluate(
         holdout_unreached=equations.failures(after),
         holdout_off_before=off_before,
         holdout_off=off,
-        holdout_rows=equations.rows,
-        holdout_outliers=tuple(equations.rows[odd].tolist()),
+        holdout_rows=equations.table.rows,
+        holdout_outliers=tuple(equations.table.rows[odd].tolist()),
         holdout_distances_before=in_short[0],
         holdout_distances=in_short[1],
         holdout_test=test,
@@ -227,11 +227,11 @@ def _points(
     by_actuators = after.machines.actuator_twists(after.states)
     variances, added = [], []
     seen = equations.prediction.predicted(after)
-    for i, measured in enumerate(equations.sets):
+    for i, measured in enumerate(equations.table.sets):
         count, k = after.residuals[i].shape
         variances.append(np.repeat(_variances(measured, uncertainty, like[i]), k))
         sigma = _of_actuators(measured, after.robot, uncertainty)
-        moved = seen[i].by_twist @ by_actuators[equations.pose_of[i]]
+        moved = seen[i].by_twist @ by_actuators[equations.table.pose_of[i]]
         part = (
             np.zeros((count, k)) if sigma is None else ((moved * sigma[:, None]) ** 2).sum(axis=2)
         )
@@ -320,7 +320,7 @@ def _variances(measured: Measurements, uncertainty: Uncertainty, like: int) -> F
     """Variance of a length of each row, mm² (N,): that of the fitted set, by sigma where stated."""
     total = uncertainty.noises[like][0]
     own = stated_variances(measured)
-    fitted = stated_variances(uncertainty.equations.sets[like])
+    fitted = stated_variances(uncertainty.equations.table.sets[like])
     if own is None or fitted is None:
         return np.full(len(measured), total)
     return own * total / float(fitted.mean())

@@ -88,7 +88,7 @@ def later(fitted: Parameters, held: Sequence[tuple[FitData, int]]) -> Later:
 
 def differs(fitted: Equations, data: FitData, like: int) -> bool:
     """Whether kind or stated sigma of a set are not those of the fitted set."""
-    own, of_fit = data.measured, fitted.sets[like]
+    own, of_fit = data.measured, fitted.table.sets[like]
     return own.kind != of_fit.kind or (own.sigma is None) != (of_fit.sigma is None)
 
 
@@ -101,8 +101,8 @@ def noise_factors(rows: Later, equations: Equations, sure: Uncertainty) -> Float
         else:
             stated = data.measured.sigma is not None
             factors.append(1.0 if stated else float(np.sqrt(sure.noises[i][0])))
-    unstated = equations.unstated[len(rows.data) :]  # load cells and actuators
-    of_fit = sure.factors[len(sure.equations.sets) :]
+    unstated = equations.blocks.unstated[len(rows.data) :]  # load cells and actuators
+    of_fit = sure.factors[len(sure.equations.table.sets) :]
     alike = len(of_fit) == len(unstated)
     return np.concatenate([factors, np.where(unstated, of_fit if alike else 1.0, 1.0)])
 
@@ -150,10 +150,10 @@ def _own_numbers(
     noise, columns = noise_factors(rows, equations, sure), np.flatnonzero(rows.own)
     search = Search(equations, start, columns)
     found, jacobian = start, np.zeros((0, len(columns)))
-    if len(equations.components):
+    if len(equations.blocks.components):
         loss = estimate.state.loss
-        width = np.full(len(equations.components), float(np.median(loss.width)))
-        same = Loss(loss.name, equations.components, width)
+        width = np.full(len(equations.blocks.components), float(np.median(loss.width)))
+        same = Loss(loss.name, equations.blocks.components, width)
         none = np.zeros((0, len(columns)))
         u, trail = search.best(search.begin(), np.zeros(len(columns)), noise, same, none)
         found = search.at(trail, u, noise).here

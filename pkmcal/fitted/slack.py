@@ -133,7 +133,7 @@ def _without_each(
 
 def _squares(equations: Equations, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
     """Squared residuals of each pose (K,)."""
-    found = np.zeros(len(equations.actuators))
+    found = np.zeros(len(equations.table.actuators))
     blocks = equations.blocks
     found[blocks.pose_of_block] = blocks.squares(equations.residual(evaluation, noise))
     return found
@@ -171,7 +171,7 @@ def taut(
 
 def _longer(equations: Equations, estimate: Estimate) -> tuple[FloatArray, FloatArray]:
     """By how much cables read longer than needed (K, equations), whitened, and redundancy."""
-    root = np.sqrt(np.repeat(estimate.weights, equations.components))
+    root = np.sqrt(np.repeat(estimate.weights, equations.blocks.components))
     taken = root[:, None] * estimate.change(estimate.half)
     every = np.ones(len(estimate.weights))  # what a robust loss sets aside is looked at as well
     assert equations.system is not None
@@ -193,10 +193,10 @@ def slack_cables(
     there = without.at(evaluation.theta, estimate.state.noise, evaluation)
     assert without.system is not None
     off = -without.system.readings_off(there) * _slopes(equations, there)
-    pose_of, actuator = np.concatenate(equations.pose_of), equations.closures.actuators
+    pose_of, actuator = np.concatenate(equations.table.pose_of), equations.closures.actuators
     cables = [
         SlackCable(
-            tuple(equations.rows[pose_of == cell.pose].tolist()),
+            tuple(equations.table.rows[pose_of == cell.pose].tolist()),
             tuple(actuator[closure] + 1 for closure in cell.closures),
             float(off[cell.pose, cell.closures[0]]),
         )
@@ -235,7 +235,7 @@ def _slopes(equations: Equations, evaluation: Evaluation) -> FloatArray:
         found = np.ones((len(poses), len(actuators)))
         if not isinstance(robot, Robot) or robot.model.chains is not None:
             return found
-        slope = robot.machine.slopes(robot.slots, equations.actuators[poses])
+        slope = robot.machine.slopes(robot.slots, equations.table.actuators[poses])
         for k, a in enumerate(actuators):
             if a >= 0:
                 found[:, k] = slope[:, _of_limbs(robot) == a].mean(axis=1)

@@ -252,7 +252,7 @@ class Solution(HeldOut):
     @property
     def expansion(self) -> dict[str, float]:
         """Coefficients of thermal expansion, 1/K, by part; empty where none were stated."""
-        return stated(self.fit.equations.datasets[0].effects)
+        return stated(self.fit.equations.prediction.datasets[0].effects)
 
     @property
     def left_out(self) -> str:

@@ -112,13 +112,13 @@ def equations_of(
 def information(equations: Equations, poses: int) -> FloatArray:
     """What each pose brings (N, k, n): derivatives of its equations, whitened and scaled."""
     equations, at = equations.begin(equations.with_exact_actuators().start())
-    rows = equations.by_parameters(at, np.ones(len(equations.unstated)))
+    rows = equations.by_parameters(at, np.ones(len(equations.blocks.unstated)))
     rows *= equations.parameters.scale
     block_of_row = equations.blocks.block_of_row
     first = np.arange(0, len(block_of_row), len(block_of_row) // poses)
     if not equations.closures.unknowns:  # rows are blocks, in their order
         return rows.reshape(poses, -1, rows.shape[1])
-    units: FloatArray = rows.reshape(len(equations.components), -1, rows.shape[1])
+    units: FloatArray = rows.reshape(len(equations.blocks.components), -1, rows.shape[1])
     return units[block_of_row[first]]
 
 

@@ -28,12 +28,12 @@ def axes(found: Identification) -> list[dict[str, Any]]:
     by_twists = [[seen.by_twist for seen in equations.prediction.predicted(at)] for at in ends]
     before, after = list[FloatArray](), list[FloatArray]()
     poses = list[IntArray]()
-    for i, measured in enumerate(equations.sets):
+    for i, measured in enumerate(equations.table.sets):
         if measured.kind not in ("position", "pose"):
             continue
-        rows = equations.rows[equations.set_of == i]
+        rows = equations.table.rows[equations.table.set_of == i]
         good = np.isfinite(measured.values).all(axis=1) & ~np.isin(rows, found.outliers)
-        run = _runs(equations.pose_of[i], targets(measured))
+        run = _runs(equations.table.pose_of[i], targets(measured))
         run[~good] = -1
         if not good.any():  # partly read rows alone
             continue
@@ -44,7 +44,7 @@ def axes(found: Identification) -> list[dict[str, Any]]:
         before.append(first)
         after.append(last)
         kept = np.array([np.flatnonzero(run == k)[0] for k in np.unique(run[run >= 0])])
-        poses.append(equations.pose_of[i][kept] + 1_000_000 * i)
+        poses.append(equations.table.pose_of[i][kept] + 1_000_000 * i)
     if not before or not sum(map(len, before)):
         return []
     first, last = np.concatenate(before), np.concatenate(after)

@@ -177,7 +177,7 @@ def budget(found: Identification, stated: Statement, predicted: FloatArray) -> B
 
 def _same_heat(found: Identification, stated: Statement) -> None:
     """Refuse another temperature than was measured, another expansion than was calibrated with."""
-    read, mean = temperatures(found.fit.equations.sets), stated.temperature
+    read, mean = temperatures(found.fit.equations.table.sets), stated.temperature
     room = max(stated.temperature_uncertainty, _ROUNDED)
     if read and (mean < read[0] - room or mean > read[1] + room):
         raise ArgumentError(
@@ -284,7 +284,7 @@ def as_data(
     return {
         **stated.texts,
         "instrument": stated.instrument,
-        "temperature": _shown(stated, temperatures(found.fit.equations.sets)),
+        "temperature": _shown(stated, temperatures(found.fit.equations.table.sets)),
         "reference_temperature": _reference(found),
         "expansion": _expansion(found, stated),
         "instrument_stated": bool(np.isfinite(stated.expanded)),

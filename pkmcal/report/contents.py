@@ -90,7 +90,9 @@ def export_command(found: Identification) -> str:
 def directions(found: Identification) -> list[dict[str, Any]]:
     """List mean, rms and largest residual of each component read, before and after; mm and rad."""
     names: dict[str, tuple[str, list[FloatArray], list[FloatArray]]] = {}
-    parts = zip(found.fit.equations.sets, found.fit.start.residuals, found.residuals, strict=True)
+    parts = zip(
+        found.fit.equations.table.sets, found.fit.start.residuals, found.residuals, strict=True
+    )
     for measured, first, last in parts:
         pairs = zip(measured.components, measured.units, strict=True)
         for k, (name, unit) in enumerate(pairs):
@@ -116,7 +118,7 @@ def points(found: Identification) -> list[dict[str, Any]]:
     equations = found.fit.equations
     off_before = misfits.distances(equations, found.fit.start)
     off = misfits.distances(equations, found.fit.end)
-    place = np.concatenate(equations.pose_of)
+    place = np.concatenate(equations.table.pose_of)
     at = found.fit.end.pose[place]
     return [
         {
@@ -198,11 +200,11 @@ def iso9283(found: Identification) -> list[dict[str, Any]]:
     """
     equations = found.fit.equations
     scores = []
-    for i, measured in enumerate(equations.sets):
+    for i, measured in enumerate(equations.table.sets):
         if measured.kind not in ("position", "pose"):
             continue
         read = np.isfinite(measured.values).all(axis=1)
-        odd = np.isin(equations.rows[equations.set_of == i], found.outliers)
+        odd = np.isin(equations.table.rows[equations.table.set_of == i], found.outliers)
         left_out = int((read & odd).sum())
         read &= ~odd
         if not read.any():
@@ -258,14 +260,14 @@ def as_seen(found: Identification, places: FloatArray) -> FloatArray:
     variance = propagate(jacobian, found.fit.uncertainty.scaled)
     undetermined = jacobian @ found.fit.undetermined()
     sure = np.linalg.norm(undetermined, axis=(1, 2)) < _NEGLIGIBLE
-    distance = np.abs(point.pose[equations.pose_of[0]] - at)[:, :3].max(axis=1)
+    distance = np.abs(point.pose[equations.table.pose_of[0]] - at)[:, :3].max(axis=1)
     sure &= (distance < _ELSEWHERE) & found.fit.uncertainty.known
     return np.where(sure, np.sqrt(variance), np.inf)
 
 
 def _first_of_last(found: Identification) -> tuple[FitData, int]:
     """A set and the number of its first row that is of the last session, whose is the robot."""
-    for data in found.fit.equations.datasets:
+    for data in found.fit.equations.prediction.datasets:
         session = data.measured.session
         if not found.sessions:
             return data, 0
@@ -291,7 +293,7 @@ def over_the_workspace(found: Identification) -> tuple[WorkspaceAccuracy, Slice 
     """Predict the accuracy over the workspace from the covariance, or say why that fails."""
     machine = found.robot
     if isinstance(machine, SerialArm):
-        q = found.fit.equations.actuators
+        q = found.fit.equations.table.actuators
         shape = (_DRAWN, q.shape[1])
         random = np.random.default_rng(0).uniform(q.min(axis=0), q.max(axis=0), shape)
         positions = as_machine(machine).forward(random).pose[:, :3]

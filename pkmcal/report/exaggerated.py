@@ -18,8 +18,8 @@ _STEPS = tuple(a * 10**b for b in range(6) for a in (1, 2, 5))
 def middle_exaggerated(found: Identification) -> tuple[Skeleton, Skeleton, int] | None:
     """`exaggerated` of a calibration, at the commands of the row in the middle."""
     equations = found.fit.equations
-    middle = len(equations.actuators) // 2
-    q, pose = equations.actuators[middle], found.fit.end.pose[middle]
+    middle = len(equations.table.actuators) // 2
+    q, pose = equations.table.actuators[middle], found.fit.end.pose[middle]
     before, after = found.fit.start.theta, found.fit.end.theta
     return exaggerated(equations.parameters, before, after, q, pose)
 

@@ -44,7 +44,7 @@ def _points(found: Identification) -> list[dict[str, Any]]:
     places = measured_places(found)
     odd = np.isin(found.rows, found.outliers)
     drawn = sample(len(places), odd)
-    names = found.fit.equations.datasets
+    names = found.fit.equations.prediction.datasets
     named = {int(row): row_names(names, [row]) for row in found.outliers[:_NAMED]}
     points = []
     for k in drawn:

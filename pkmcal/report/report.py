@@ -96,7 +96,7 @@ def gather(
         "found": found,
         "points": points,
         "worst": contents.worst(points),
-        "outlier_names": row_names(found.fit.equations.datasets, found.outliers),
+        "outlier_names": row_names(found.fit.equations.prediction.datasets, found.outliers),
         "moved": contents.moved(points),
         "directions": contents.directions(found),
         "parameters": contents.parameters(found),
@@ -105,7 +105,9 @@ def gather(
         "iso9283": contents.iso9283(found),
         "axes": axes(found),
         "certificate": signed,
-        "heat": in_words(found.fit.equations.sets, found.expansion, found.fit.parameters.robot),
+        "heat": in_words(
+            found.fit.equations.table.sets, found.expansion, found.fit.parameters.robot
+        ),
         "accuracy": accuracy,
         "slice": None if isinstance(predicted, str) else predicted[1],
         "no_accuracy": predicted if isinstance(predicted, str) else "",

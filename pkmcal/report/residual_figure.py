@@ -42,7 +42,9 @@ def residuals(found: Identification) -> Figure:
     Of very many rows the outliers and a sample of the others; the title says so.
     """
     units = [
-        unit for unit in ("mm", "rad") if any(unit in m.units for m in found.fit.equations.sets)
+        unit
+        for unit in ("mm", "rad")
+        if any(unit in m.units for m in found.fit.equations.table.sets)
     ]
     figure = empty_figure(11.0, 3.0 * len(units) + 4.2)
     figure.set_layout_engine("constrained", wspace=0.06)  # a bar's label stands beside a panel's
@@ -68,8 +70,10 @@ def _by_row(panel: Axes, found: Identification, drawn: IntArray, unit: str) -> N
     by, shown = displayed(1.0, unit)
     outliers: list[FloatArray] = [np.empty((2, 0))]
     most = 0.0
-    for i, (measured, residual) in enumerate(zip(equations.sets, found.residuals, strict=True)):
-        own = np.flatnonzero(equations.set_of == i)
+    for i, (measured, residual) in enumerate(
+        zip(equations.table.sets, found.residuals, strict=True)
+    ):
+        own = np.flatnonzero(equations.table.set_of == i)
         shared = np.isin(own, drawn)
         rows = found.rows[own][shared]
         odd = np.isin(rows, found.outliers)
@@ -160,7 +164,7 @@ def _over_the_workspace(panel: Axes, found: Identification, drawn: IntArray) -> 
 def _without_direction(found: Identification) -> tuple[FloatArray, str]:
     """Sizes of residuals (N, 3) as z, and what they are."""
     sizes, angles = [], False
-    for place, residual in zip(found.fit.equations.pose_of, found.residuals, strict=True):
+    for place, residual in zip(found.fit.equations.table.pose_of, found.residuals, strict=True):
         if residual.shape[1]:
             sizes.append(np.degrees(np.linalg.norm(residual, axis=1)))
             angles = True

@@ -19,7 +19,7 @@ def residual_vectors(found: Identification, at: Evaluation) -> FloatArray:
     """
     parts = []
     equations = found.fit.equations
-    every = zip(equations.sets, at.residuals, equations.prediction.predicted(at), strict=True)
+    every = zip(equations.table.sets, at.residuals, equations.prediction.predicted(at), strict=True)
     for measured, residual, seen in every:
         lengths = [k for k, unit in enumerate(measured.units) if unit == "mm"]
         along, off = seen.by_twist[:, lengths, 3:], residual[:, lengths]
@@ -33,10 +33,10 @@ def measured_places(found: Identification) -> FloatArray:
     """Where the measured points of all rows are in the robot's base frame, mm (N, 3)."""
     equations, end = found.fit.equations, found.fit.end
     parts = []
-    for i in range(len(equations.sets)):
+    for i in range(len(equations.table.sets)):
         target = equations.prediction.arguments_of(i, end.theta).get("target")
         if target is None:
-            parts.append(end.pose[equations.pose_of[i], :3])
+            parts.append(end.pose[equations.table.pose_of[i], :3])
         else:
-            parts.append(instruments.points(end.pose[equations.pose_of[i]], target)[0])
+            parts.append(instruments.points(end.pose[equations.table.pose_of[i]], target)[0])
     return np.concatenate(parts)

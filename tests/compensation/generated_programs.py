@@ -49,7 +49,8 @@ ODD = {
         G1 X5 G91 | G91 X3 | G90 | G20 | G21 | G95 | G94 | G1 Y3 M1 | G80 | X4 | G38.2 X1 |
         G1 X5 X6 | G0 G1 X2 | % | G1 (a (b) X5 | M30 | G64 | (G1 X5 | G1 X5 ; (a | N5 X3 |
         n9g1x4y5 | g 1 x 4 | G1.0 X3 | T3 M6 X5 | G28 Z5 | M429 | G5 X1 Y1 P1 Q1 | G41 D1 |
-        M6 G1 X5 F90 | F250 | G1 F333 | G1 X5 H3 | G1 X5 P2 | G7 | G33 Z-1 K1
+        M6 G1 X5 F90 | G70 | G71 Q100 X4 | G72.1 Q1 | G74 X1 |
+        F250 | G1 F333 | G1 X5 H3 | G1 X5 P2 | G7 | G33 Z-1 K1
     """,
     "marlin": """
         G1 X\u0663 |
@@ -63,7 +64,8 @@ ODD = {
         G1 X5 (Z3) | (G1 X5) | G1 X5 X6 | G4 P5 G1 X20 | M999 X5 | FOO X5 | M605 S2 | M851 Z1 |
         M852 I1 | M360 | M810 G1 X5 | G28 X | G28 X0 Y0 | G92 E0 | G92 E5 | G42 I1 J1 |
         M207 S1 F100 | F500 | G1 F700 | G1 X5 H2 | G1 X4 S200 | M211 S0 | M350 X16 | G92 E0 X5 |
-        G54 | G60 | G5 X1 Y2 | T0 X5 | %
+        G54 | G60 | G5 X1 Y2 | T0 X5 | % | M26 S0 | M351 S1 X1 | M240 | M240 X5 | M915 | M916 X |
+        M862.3 P "a" | M25 | M704 | G0 X20 Y-9 S90
     """,
     "reprap": """
         GG1 X5 | MG90 | TG91 |
@@ -79,7 +81,9 @@ ODD = {
         G1 X{1+2} | G1 X5 (Z3) | (a) G1 X5 | g1 x5 | G1 'x5 | N3 G1 X5 | G92 E0 | G92 E4 |
         G10 L2 P1 X5 | G10 P1 X5 | G10 L20 P1 Z0 | G31 Z2 | M98 P"X5" | M999 X5 | G28 X |
         G28 X0 Y0 | G1 F900 | F900 | G60 | G61 | M669 K1 | G01 X4 | G1.1 X4 | M569 P0 S1 | G93 |
-        M42 X5 | M600 X5 | G30 P0 X1 Y1
+        M42 X5 | M600 X5 | G30 P0 X1 Y1 | M291 P"a" S3 X1 | M109 S200 | M226 | M7 | G80 | G40 |
+        M560 P"a" | M596 P1 | M594 P1 | M916 | G38.2 Z-5 | G28 M106 S1 | M98 P"a" G1 X3 Y2 Z40 |
+        M651 | M601 | M957 E"a"
     """,
     "klipper": """
         G2 X1 Y1 I1 | G92 X0 | G92 | SET_GCODE_OFFSET Z=0.1 | SET_KINEMATIC_POSITION X=10 |

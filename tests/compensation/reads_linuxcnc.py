@@ -8,7 +8,34 @@ from __future__ import annotations
 
 from .controller import Controller, Odd
 
-ODD = {2, 3, 5, 5.1, 7, 10, 33, 38.2, 41, 42, 43, 43.1, 52, 53, 55, 59, 59.1, 73, 76, 81, 83, 92.3}
+ODD = {
+    2,
+    3,
+    5,
+    5.1,
+    7,
+    10,
+    33,
+    38.2,
+    41,
+    42,
+    43,
+    43.1,
+    52,
+    53,
+    55,
+    59,
+    59.1,
+    70,
+    71,
+    72.1,
+    73,
+    74,
+    76,
+    81,
+    83,
+    92.3,
+}
 ODD_M = {72, 73, 98, 99, 428, 429, 430}
 NON_MODAL = {10, 28, 30, 52, 53, 92, 92.1, 92.2, 92.3}
 
@@ -86,7 +113,7 @@ def _act(it: Controller, words: list[tuple[str, float]], state: dict, line: str)
         if each in g:
             state["times"], state["turns"] = each == 93, each == 95
     if "F" in values:
-        it.feed = values["F"]
+        it.feed = values["F"] * (25.4 if state["inch"] else 1.0)  # units are changed behind it
     apart = {0, 1, 20, 21, 90, 91, 93, 94, 95, 80}
     rest = [f"{name}{value:g}" for name, value in words if name in "TSPQ" or name in "GM"]
     rest = [each for each in rest if not (each[0] == "G" and float(each[1:]) in apart)]
@@ -132,7 +159,4 @@ def _move(it: Controller, targets: dict[str, float], state: dict, values: dict) 
             raise AssertionError("G1 in G93 without F")
         it.move(did, targets, 0.0, 1.0 / values["F"])
     else:
-        unit = 25.4 if state["inch"] else 1.0
-        feed, it.feed = it.feed, it.feed * unit
         it.move(did, targets, 0.0, None)
-        it.feed = feed

@@ -11,11 +11,12 @@ from .controller import Controller, Odd
 ODD = {
     *("M92", "M206", "M290", "M350", "M375", "M376", "M425", "M501", "M502", "M556", "M569"),
     *("M579", "M584", "M665", "M666", "M667", "M669", "M23", "M24", "M28", "M32", "M121", "G2"),
-    *("G3", "G29", "G32", "G53", "G55", "G68", "G31", "G93", "M606"),
+    *("G3", "G29", "G32", "G53", "G55", "G68", "G31", "G93", "M606", "M560", "M594", "M596"),
+    "M916",
 }
 ELSEWHERE = {
     *("G30", "G27", "M18", "M84", "M98", "M401", "M402", "M600", "M701", "M702", "M0", "M1"),
-    *("M125", "M582", "M585", "M675", "G38"),
+    *("M125", "M582", "M585", "M675", "G38", "M109", "M226", "M601", "M957"),
 }
 KNOWN = {
     *(
@@ -36,7 +37,7 @@ KNOWN = {
         "M106",
         "M107",
     ),
-    *("M109", "M114", "M116", "M117", "M118", "M120", "M140", "M190", "M201", "M203", "M204"),
+    *("M114", "M116", "M117", "M118", "M120", "M140", "M190", "M201", "M203", "M204"),
     *("M207", "M220", "M221", "M291", "M400", "M486", "M566", "M568", "M572", "M593"),
 }
 
@@ -61,6 +62,8 @@ def run(text: str, start: dict[str, float], home: dict[str, float], version: int
         while line:
             command, line = _first(line)
             _act(it, command, state, home, version)
+            if state.pop("macro", False) and version == 1:
+                break  # "must be the last command in that line"
     return it
 
 
@@ -111,6 +114,7 @@ def _act(it: Controller, command: str, state: dict, home: dict, version: int) ->
     if letter == "T":
         it.other(command)
         it.hidden()
+        state["macro"] = True
     elif name in ("G0", "G1"):
         if rest[:1] == ".":
             raise Odd("G1 with a fraction")
@@ -153,15 +157,17 @@ def _act(it: Controller, command: str, state: dict, home: dict, version: int) ->
             raise Odd("G92 alone")
     elif name == "G28":
         it.other(command)
-        it.at = dict(home)
+        it.at, state["macro"] = dict(home), True
     elif name == "G10" and set("LXYZ") & set(_words(rest)):
         raise Odd("G10 sets offsets")
     elif name in ODD:
         raise Odd(name)
     else:
         it.other(command)
-        if name in ELSEWHERE or name not in KNOWN:
+        moved = name == "M291" and set("XYZ") & set(_words("".join(rest.split('"')[::2])))
+        if name in ELSEWHERE or name not in KNOWN or moved:
             it.hidden()
+            state["macro"] = True
 
 
 def _words(rest: str) -> dict[str, float]:

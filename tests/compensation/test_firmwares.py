@@ -52,19 +52,30 @@ def corrected(text: str, firmware: str, folder: Path, **options: Any) -> str:
     return found.text
 
 
-def reached(steps: list[Any], joints: bool) -> np.ndarray:
-    """Where the machine goes on the moves of a controller."""
-    told = np.array([step.at for step in steps if step.moves]).reshape(-1, 3)
+LINES = {
+    "linuxcnc": {"G1"},
+    "marlin": {"G0", "G1"},
+    "reprap": {"G0", "G1"},
+    "klipper": {"G0", "G1"},
+}
+
+
+def reached(told: np.ndarray, joints: bool) -> np.ndarray:
+    """Where the machine goes on the coordinates of a controller."""
     if not joints:
         told = DELTA.inverse(np.concatenate([told, np.zeros_like(told)], axis=1))
     guess = np.tile(DELTA.home, (len(told), 1))
     return MACHINE.forward(told, guess=guess).pose[:, :3]
 
 
-def require_the_same(meant: Controller, did: Controller, joints: bool) -> None:
-    """Each move ends where it was meant, on its line, with its filament and in its time."""
-    moved = iter(reached(did.steps, joints))
-    steps = [(step, next(moved) if step.moves else None) for step in did.steps]
+def require_the_same(meant: Controller, did: Controller, joints: bool, lines: set[str]) -> None:
+    """Each move ends where it was meant, with its filament and in its time; lines are straight."""
+    told = [step for step in did.steps if step.moves]
+    ends, begins = (
+        np.array([getattr(step, name) for step in told]).reshape(-1, 3) for name in ("at", "begin")
+    )
+    moved = iter(zip(reached(ends, joints), reached((ends + begins) / 2, joints), strict=True))
+    steps = [(step, *(next(moved) if step.moves else (None, None))) for step in did.steps]
     filament, going_on = 0.0, False
     for wanted in meant.steps:
         if not wanted.moves:
@@ -77,8 +88,11 @@ def require_the_same(meant: Controller, did: Controller, joints: bool) -> None:
         minutes = 0.0
         while True:
             assert steps and steps[0][0].moves, f"{wanted}: not reached"
-            step, at = steps.pop(0)
+            step, at, between = steps.pop(0)
             assert step.did == wanted.did, (step, wanted)
+            if going_on and wanted.did in lines:
+                aside = between - before - (between - before) @ way / max(way @ way, 1e-12) * way
+                assert np.linalg.norm(aside) < CHORD + ROUNDING, (wanted, step, aside)
             minutes += step.minutes
             stays = not going_on and not way.any()  # E alone, where no move has led
             if stays or np.linalg.norm(at - target) < ROUNDING:
@@ -110,7 +124,7 @@ def followed(text: str, firmware: str, folder: Path, start: bool, joints: bool) 
     for version in VERSIONS[firmware]:
         run = READS[firmware].run
         meant = run(text, begin, begin, version)
-        require_the_same(meant, run(new, begin, begin, version), joints)
+        require_the_same(meant, run(new, begin, begin, version), joints, LINES[firmware])
     return True
 
 

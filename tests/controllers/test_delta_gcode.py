@@ -232,7 +232,7 @@ def test_what_a_robot_file_cannot_hold_is_no_silent_zero(tmp_path: Path) -> None
             "M665 L250 R125 H300\nM666 X0.1 A0 B-1.5\n",
             "B of M666 tilts the bed by -1.5 %",
         ),
-        ("marlin", "G20\nM665 L10 R5 H12\nM666 X0\n", "G20: the numbers are in inches"),
+        ("marlin", "G20\nM665 L10 R5 H12\nM666 X0\n", "stands behind G20, in inches"),
         ("marlin", "M665 L250 R125 H300\nM666 X0.2\nM851 Z0\n", "must not be above 0, found 0.2"),
         (
             "marlin",

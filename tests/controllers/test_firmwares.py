@@ -29,8 +29,9 @@ BELTS = "[MSG]\nCLBM:[{bl:1851.5, br:1843.25,   tr:1.8e3,   tl:1820},]\n"
         ("M669 K10 U170 L400 H300 R100 A-90:60\n", "reprap"),
         ("M669 K6 N4 A1:2:3\n", "hangprinter"),
         ("echo:  M665 L250 R125 H300\necho:  M666 X-0.1\n", "marlin"),
-        (SIZE + "M851 Z-1\n", "marlin"),
-        (SIZE + "; M574 echo:\nM851 Z-1\n", "marlin"),
+        (SIZE + "M851 X0 Y0 Z-1\n", "marlin"),
+        (SIZE + "; M574 echo:\nM851 X0 Y0 Z-1\n", "marlin"),
+        (SIZE + "G31 Z1\nM851 Z-1\n", "reprap"),
         (MASLOW, "maslow"),
         ("$/Maslow_tlX=-6.2\n", "maslow"),
         (BELTS, "maslow"),
@@ -40,7 +41,7 @@ def test_a_file_shows_whose_it_is(text: str, firmware: str) -> None:
     assert firmware_of(text, "file") == firmware
 
 
-@pytest.mark.parametrize("text", [SIZE, SIZE + "G31 Z1\nM851 Z-1\n", "hello\n", ""])
+@pytest.mark.parametrize("text", [SIZE, SIZE + "M851 Z-1\n", "hello\n", ""])
 def test_a_file_that_may_be_of_two_is_asked_about(text: str, tmp_path: Path) -> None:
     """The adjustments of M666 have opposite signs."""
     (tmp_path / "f.g").write_text(text)

@@ -39,7 +39,7 @@ def in_small_lots(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(module, name, together)
 
 
-@pytest.mark.parametrize("options", [{}, {"loss": "huber"}, {"covariance": "cluster"}])
+@pytest.mark.parametrize("options", [{}, {"loss": "huber"}, {"loss": "cluster"}])
 def test_a_calibration_in_lots_is_that_made_at_once(
     hexapod: pk.Robot, options: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -1,0 +1,18 @@
+"""Words that mean the same to Marlin and to RepRapFirmware."""
+
+from pkmcal.compensation.gcode_dialect import table
+
+PRINTERS = table(
+    harmless="""
+        G4 G10 G11 G17-G19 G60 M3-M5 M17 M20-M22 M27 M30 M42 M73 M80 M81 M85 M102 M104-M108
+        M110-M112 M114-M120 M122 M140 M141 M143 M150 M190 M191 M200 M201 M203-M205 M207 M208
+        M220 M221 M260 M261 M280 M300-M305 M308 M309 M400 M404 M407 M486 M500 M503 M540
+        M552-M554 M575 M592 M593 M672 M906 M911-M913 M951
+    """,
+    moves="G30 M18 M25 M84 M125 M401 M402 M600 M701 M702 M997 M999 T",
+    curve="G2 G3 G5 G38.2 G38.3 G38.4 G38.5",
+    origin="G53 G55-G59 G59.1 G59.2 G59.3 M206 M290 M425 M851",
+    bed="G29",
+    numbers="M92 M350 M501 M502 M665 M666",
+    program="M23 M24 M28 M29 M32",
+)
