@@ -49,6 +49,7 @@ help:
 
 demo: $(PACKAGE)
 	$(BIN)/pkmcal demo
+	@echo "to use pkmcal in this terminal:  . $(BIN)/activate"
 
 test: $(TESTS)
 	$(BIN)/pytest -n auto --maxprocesses 8 --dist loadfile -m "not slow"
@@ -180,14 +181,14 @@ $(BIN)/pip:
 
 $(PACKAGE): $(SOURCES) | $(BIN)/pip
 	$(PREREQUISITES)
-	@echo "installing pkmcal in $(VENV) and compiling its core: a minute or two"
+	@echo "installing pkmcal in $(VENV) and compiling its core: some two minutes of processor time"
 	$(PIP) install --editable .
 	@$(SHOW_TYPES)
 	@touch $@
 
 $(TESTS): $(SOURCES) | $(BIN)/pip
 	$(PREREQUISITES)
-	@echo "installing pkmcal and its tests in $(VENV) and compiling its core: about a minute"
+	@echo "installing pkmcal and its tests in $(VENV) and compiling its core: some two minutes of processor time"
 	$(PIP) install --editable ".[test,lint]"
 	@$(SHOW_TYPES)
 	@touch $@ $(PACKAGE)

@@ -268,8 +268,8 @@ def bench_100_belts(report: Report, error: float) -> None:
     def alone() -> Callable[[], object]:
         """The least squares from there to the minimum."""
         made = begin()
-        units, n = len(made.equations.components), len(made.scale)
-        loss = Loss("linear", made.equations.components, np.ones(units))
+        units, n = len(made.equations.blocks.components), len(made.scale)
+        loss = Loss("linear", made.equations.blocks.components, np.ones(units))
         given = (
             made.search.begin(),
             np.zeros(n),

@@ -50,7 +50,12 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.diagnostics.moved import Moved as Moved
     from pkmcal.diagnostics.verdict import Verdict as Verdict
     from pkmcal.diagnostics.verdict import diagnose as diagnose
+    from pkmcal.effects.elasticity import Elasticity as Elasticity
     from pkmcal.effects.expansion import Expansion as Expansion
+    from pkmcal.effects.gears import Backlash as Backlash
+    from pkmcal.effects.gears import Coupling as Coupling
+    from pkmcal.effects.gears import Harmonics as Harmonics
+    from pkmcal.effects.sag import Sag as Sag
     from pkmcal.error_model.allocation import Allocation as Allocation
     from pkmcal.error_model.allocation import allocate_tolerance as allocate_tolerance
     from pkmcal.error_model.sensitivity import Sensitivity as Sensitivity
@@ -128,7 +133,10 @@ _HOMES = {
     "compensation.program": ("CorrectedProgram", "compensate_program"),
     "compensation.pso": ("SwarmResult", "pso"),
     "core.swarm": ("CONSTRICTION", "SwarmSettings"),
+    "effects.elasticity": ("Elasticity",),
     "effects.expansion": ("Expansion",),
+    "effects.gears": ("Backlash", "Coupling", "Harmonics"),
+    "effects.sag": ("Sag",),
     "error_model.allocation": ("Allocation", "allocate_tolerance"),
     "error_model.sensitivity": ("Sensitivity", "sensitivity", "study_cases"),
     "error_model.tolerance": ("Tolerance", "tolerance"),

@@ -15,7 +15,22 @@ from pkmcal.display import Table, first_rows, visible
 from pkmcal.exceptions import ArgumentError
 
 
-class Result:
+class ReadOnly:
+    """Fields that are arrays cannot be written to: what is stated of them would not follow.
+
+    The array that was given stays as it is.
+    """
+
+    def __post_init__(self) -> None:
+        fields = vars(self)
+        for name, value in fields.items():
+            if isinstance(value, np.ndarray) and value.flags.writeable:
+                kept = value.view()
+                kept.flags.writeable = False
+                fields[name] = kept
+
+
+class Result(ReadOnly):
     """A result that says itself: ``repr`` in one line, ``str`` and ``_repr_html_`` as tables.
 
     A subclass gives its parts once, text and tables in the order they are read; the first is its

@@ -163,6 +163,30 @@ def test_a_type_checker_finds_the_package_where_it_is_installed(tmp_path: Path) 
     assert found == ["2"], f"make installs a file that says where it is: {done.stdout}"
 
 
+@pytest.mark.slow
+def test_the_robot_that_was_found_is_of_the_type_that_was_given(tmp_path: Path) -> None:
+    """In a script of a user, who need not ask which it is; what is no Robot is refused."""
+    pytest.importorskip("mypy")
+    lines = [
+        "import pkmcal as pk",
+        "def found(robot: pk.Robot, arm: pk.SerialArm, read: pk.Measurements) -> None:",
+        "    machine: pk.Robot = pk.identify(robot, read).robot",
+        "    same: pk.Robot = pk.identify(robot, read, unknown='frame').robot_of('thursday')",
+        "    other: pk.SerialArm = pk.identify(arm, read).robot",
+        "    wrong: pk.Robot = pk.identify(arm, read).robot",
+        "def shown(found: pk.Identification) -> None:",
+        "    unasked: pk.Robot = found.robot",
+    ]
+    (tmp_path / "script.py").write_text("\n".join(lines) + "\n")
+    done = subprocess.run(
+        [sys.executable, "-m", "mypy", "--ignore-missing-imports", "script.py"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+    )
+    assert re.findall(r"^script\.py:(\d+): error", done.stdout, re.MULTILINE) == ["6", "8"], done
+
+
 def test_version_is_stated_once() -> None:
     files = [ROOT / "pyproject.toml", ROOT / "setup.py"]
     for folder in ("pkmcal", "derive", "csrc", "generated"):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
 from os import PathLike
 from pathlib import Path
@@ -22,8 +22,9 @@ from pkmcal.arms.denavit_hartenberg import (
     table_of,
 )
 from pkmcal.arms.inputs import motion
+from pkmcal.arms.joint_laws import JointLaws, Term
 from pkmcal.arms.serial_chain import SerialChain
-from pkmcal.arrays import FloatArray
+from pkmcal.arrays import FloatArray, as_rows
 from pkmcal.display import Table, fixed
 from pkmcal.exceptions import ArgumentError, FileError
 from pkmcal.files.reading import Input
@@ -62,6 +63,9 @@ class SerialArm(SerialChain, Result):
         What the joints are called, so that columns of measurements may be.
     source : (path, tip, base), optional
         The URDF file it was read from; `from_urdf` gives it.
+    laws : JointLaws, optional
+        What its joints add to their commands: sag, gears, coupled axes. Files and
+        `identify(effects=…)` give them.
 
     Raises
     ------
@@ -200,7 +204,39 @@ class SerialArm(SerialChain, Result):
             kinds=self.kinds,
             name=self.name,
             joint_names=self.joint_names,
+            laws=self.laws,
         )
+
+    @property
+    def rigid(self) -> SerialArm:
+        """The arm whose joints are where they are commanded; itself where it is that."""
+        return self if self.laws is None else self.with_laws(None)
+
+    def with_laws(self, laws: JointLaws | None) -> SerialArm:
+        """The arm with other laws of its joints, or without."""
+        changed: Any = {**self.arguments, "laws": laws}
+        return SerialArm(**changed)
+
+    def with_terms(self, terms: Iterable[Term]) -> SerialArm:
+        """The arm with these numbers among those of its joints, 0 where they are new."""
+        laws = self.laws or JointLaws(self.axes, self.points, self.kinds, {})
+        return self.with_laws(laws.with_terms(terms))
+
+    def approaching(self, approach: ArrayLike) -> SerialArm:
+        """The arm with joints that come from below or above, which backlash depends on.
+
+        Parameters
+        ----------
+        approach : array_like (n,) or (N, n)
+            1 where a joint's reading had grown, -1 where it had fallen, 0 where that is not known:
+            for all rows, or for each of those that are then computed.
+        """
+        rows, shape = as_rows("approach", approach, self.n_joints)
+        if not np.isin(rows, (-1, 0, 1)).all():
+            raise ArgumentError("approach must be 1, -1 or 0 for each joint")
+        if self.laws is None:
+            return self
+        return self.with_laws(self.laws.approaching(rows[0] if shape == () else rows))
 
     def error_motions(self) -> FloatArray:
         """The motions E by its joint errors, in the base (eq. 10 and 18), (n, 4, 4)."""
@@ -322,10 +358,15 @@ class SerialArm(SerialChain, Result):
         Raises
         ------
         ValueError
-            The source holds another arm, or none is known.
+            The source holds another arm, or none is known; joints that have laws.
         """
         from pkmcal.arms import urdf
 
+        if self.laws is not None:
+            raise ArgumentError(
+                f"robot: {self.name}: a URDF does not hold what joints add to their commands; save"
+                " arm.rigid"
+            )
         if source is None:
             if self.source is None:
                 raise ArgumentError("source: this arm was not read from a URDF file; name one")

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from pkmcal import arguments, screw
+from pkmcal.arms import joint_law_file
 from pkmcal.arms.inputs import ERRORS, KINDS, ArmArguments, kinds_of
 from pkmcal.arrays import FloatArray, Unit
 from pkmcal.core.library import COORDINATE_UNITS, POSE
@@ -18,7 +19,7 @@ from pkmcal.files.toml_table import Table, shown
 from pkmcal.geometry import robot_file
 from pkmcal.geometry.robot_file_writer import lines
 
-TOP = ("name", "units", "tool", "joint")
+TOP = ("name", "units", "gravity", "tool", "joint")
 HEADER = "# A serial arm for pkmcal, at zero: lengths in mm, angles in rad.\n"
 
 
@@ -43,17 +44,22 @@ def parse(source: Source) -> ArmArguments:
     tool.only(("home",))
     joints = top.tables("joint", "an arm")
     for joint in joints:
-        joint.only(("name", "kind", "axis", "point", "error"))
-    kinds = [joint.choice("kind", KINDS, "kind of joint") for joint in joints]
+        joint.only(("name", "kind", "axis", "point", "error", *joint_law_file.KEYS))
+    kinds = kinds_of(
+        [joint.choice("kind", KINDS, "kind of joint") for joint in joints], len(joints)
+    )
+    axes = np.array([joint.vector("axis") for joint in joints])
+    points = np.array([_point(joint) for joint in joints])
     return {
-        "axes": np.array([joint.vector("axis") for joint in joints]),
-        "points": np.array([_point(joint) for joint in joints]),
+        "axes": axes,
+        "points": points,
         "home": _home(tool),
-        "kinds": kinds_of(kinds, len(joints)),
+        "kinds": kinds,
         "name": top.text("name"),
         "joint_errors": np.array([_error(joint) for joint in joints]),
         "joint_names": _names(joints),
         "source": None,
+        "laws": joint_law_file.read(top, joints, axes, points, kinds),
     }
 
 
@@ -65,7 +71,10 @@ def write(arm: ArmArguments, path: str | os.PathLike[str], comment: str = "") ->
     OSError
         The folder does not exist or cannot be written.
     """
-    head = {"name": arm["name"], "units": {"length": "mm", "angle": "rad"}}
+    head: dict[str, Any] = {"name": arm["name"], "units": {"length": "mm", "angle": "rad"}}
+    laws = arm["laws"]
+    if laws is not None:
+        head["gravity"] = list(laws.gravity)
     blocks = [HEADER, lines(head), "[tool]\n" + lines({"home": arm["home"][:3].tolist()})]
     for i, kind in enumerate(arm["kinds"]):
         joint: dict[str, Any] = {}
@@ -76,6 +85,8 @@ def write(arm: ArmArguments, path: str | os.PathLike[str], comment: str = "") ->
         error = dict(zip(ERRORS, arm["joint_errors"][i].tolist(), strict=True))
         if any(error.values()):
             joint["error"] = error
+        if laws is not None:
+            joint |= joint_law_file.keys(laws, i)
         blocks.append("[[joint]]\n" + lines(joint))
     write_whole(path, arguments.comment(comment) + "\n".join(blocks))
 

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from pkmcal import screw
 from pkmcal.arguments import shown, word, words
+from pkmcal.arms.joint_laws import JointLaws
 from pkmcal.arrays import FloatArray, as_numbers, as_rows, furthest_axis
 from pkmcal.core.screws import FRAMES
 from pkmcal.exceptions import ArgumentError
@@ -40,6 +41,7 @@ class ArmArguments(TypedDict):
     joint_errors: FloatArray
     joint_names: tuple[str, ...] | None
     source: Source | None
+    laws: JointLaws | None
 
 
 def names_of(given: Sequence[str] | None, joints: int) -> tuple[str, ...] | None:

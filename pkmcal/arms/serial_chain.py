@@ -22,6 +22,7 @@ from pkmcal.arms.inputs import (
     names_of,
 )
 from pkmcal.arms.inverse import ArmInverse, Part, damped_least_squares
+from pkmcal.arms.joint_laws import JointLaws
 from pkmcal.arrays import FloatArray, Unit, as_rows
 from pkmcal.core.screws import Arm, Links
 from pkmcal.exceptions import ArgumentError
@@ -49,12 +50,14 @@ class SerialChain:
         joint_errors: ArrayLike | None = None,
         joint_names: Sequence[str] | None = None,
         source: Source | None = None,
+        laws: JointLaws | None = None,
     ) -> None:
         self._name = instance("name", name, str)
         self._axes, self._points = axes_and_points(axes, points)
         self._kinds = kinds_of(kinds, len(self._axes))
         self._joint_names = names_of(joint_names, len(self._axes))
         self._source = source
+        self._laws = laws
         self._home = motion("home", home)
         prismatic = np.array([kind == "prismatic" for kind in self._kinds], dtype=np.int32)
         self.core = Arm(prismatic, joint_frames(self._axes), self._points, self._home)
@@ -84,6 +87,11 @@ class SerialChain:
     def source(self) -> Source | None:
         """The URDF file it was read from (path, tip, base), for `save_urdf`."""
         return self._source
+
+    @property
+    def laws(self) -> JointLaws | None:
+        """What joints add to their commands: sag, gears; None where they add nothing."""
+        return self._laws
 
     @property
     def n_joints(self) -> int:
@@ -147,6 +155,7 @@ class SerialChain:
             "joint_errors": self.joint_errors,
             "joint_names": self.joint_names,
             "source": self.source,
+            "laws": self.laws,
         }
 
     # kinematics ---------------------------------------------------------------------------------
@@ -181,7 +190,7 @@ class SerialChain:
             A wrong shape, no numbers, or errors that are not finite.
         """
         rows, shape, links = self._given(theta, joint_errors)
-        return self.core.forward(rows, links, threads).reshape(*shape, 4, 4)
+        return self.core.forward(self._moved(rows), links, threads).reshape(*shape, 4, 4)
 
     def jacobian(
         self, theta: ArrayLike, joint_errors: ArrayLike | None = None, frame: Frame = "space"
@@ -210,7 +219,10 @@ class SerialChain:
         """
         seen = frame_number(frame)
         rows, shape, links = self._given(theta, joint_errors)
-        return self.core.jacobian(rows, links, seen).reshape(*shape, 6, self.n_joints)
+        by_joints = self.core.jacobian(self._moved(rows), links, seen)
+        if self._laws is not None:
+            by_joints = by_joints @ self._laws.slope(rows)
+        return by_joints.reshape(*shape, 6, self.n_joints)
 
     def error_jacobian(
         self, theta: ArrayLike, joint_errors: ArrayLike | None = None, frame: Frame = "space"
@@ -238,7 +250,32 @@ class SerialChain:
         """
         seen = frame_number(frame)
         rows, shape, links = self._given(theta, joint_errors)
-        return self.core.error_jacobian(rows, links, seen).reshape(*shape, 6, 6 * self.n_joints)
+        by_errors = self.core.error_jacobian(self._moved(rows), links, seen)
+        return by_errors.reshape(*shape, 6, 6 * self.n_joints)
+
+    def law_jacobian(self, theta: ArrayLike, frame: Frame = "space") -> FloatArray:
+        """The tool's twist by each number of the joints' laws, the coordinates held.
+
+        Parameters
+        ----------
+        theta : array_like (..., n)
+            Joint coordinates, rad and mm.
+        frame : {"space", "body", "tip"}
+            As in `jacobian`.
+
+        Returns
+        -------
+        ndarray (..., 6, k)
+            In the order of ``arm.laws.names``; k = 0 without laws.
+        """
+        seen = frame_number(frame)
+        rows, shape, links = self._given(theta, None)
+        if self._laws is None:
+            return np.empty((*shape, 6, 0))
+        by_joints = self.core.jacobian(self._moved(rows), links, seen)
+        of_terms = by_joints[:, :, [term.joint for term in self._laws.terms]]
+        by_numbers: FloatArray = of_terms * self._laws.basis(rows)[:, None]
+        return by_numbers.reshape(*shape, 6, -1)
 
     def inverse(
         self,
@@ -275,6 +312,10 @@ class SerialChain:
         return damped_least_squares(self, target, guess, joint_errors, parts)
 
     # --------------------------------------------------------------------------------------------
+
+    def _moved(self, rows: FloatArray) -> FloatArray:
+        """Where the joints are that are commanded to these coordinates."""
+        return rows if self._laws is None else self._laws.moved(rows)
 
     def _given(
         self, theta: ArrayLike, joint_errors: ArrayLike | None

@@ -48,6 +48,7 @@ def read(path: str | os.PathLike[str], tip: str | None, base: str | None) -> Arm
         "joint_errors": np.zeros((len(joints), 6)),
         "joint_names": tuple(joint.name for joint in joints),
         "source": Source(str(path), tip, base),
+        "laws": None,
     }
 
 

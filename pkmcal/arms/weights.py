@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike
 from pkmcal.arms.serial_chain import SerialChain
 from pkmcal.arrays import FloatArray, as_numbers, as_rows
 from pkmcal.exceptions import ArgumentError
+from pkmcal.geometry.elastic import GRAVITY
 
-GRAVITY = (0.0, 0.0, -9.80665)  # m/s², in the axes of the base
 _MOST_STEPS = 60
 _SETTLED = 1e-15  # rad and mm
 
@@ -60,10 +60,8 @@ def gravity_torques(
 
     Parameters
     ----------
-    arm : SerialArm
-        With its own joint errors.
-    theta : array_like (..., n)
-        Joint coordinates, rad and mm.
+    arm, theta
+        As for `link_motions`.
     masses : array_like (n,)
         Of the link behind each joint, kg.
     centres : array_like (n, 3)

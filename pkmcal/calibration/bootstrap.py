@@ -154,7 +154,7 @@ def bootstrap(
     workers = arguments.executor(executor)
     replicate = Replicate(found.fit)
     done: Iterable[FloatArray] = (workers.map if workers else map)(replicate, parts)
-    values = np.concatenate(list(done))
+    values = np.concatenate(list(done))[:, found.columns]
     good = values[np.isfinite(values).all(axis=1)]
     if len(good) < 2:
         raise ArgumentError("found: its replicates do not converge, the fit is not to be trusted")
@@ -207,9 +207,13 @@ class Replicate:
     def _one(self, random: np.random.Generator) -> FloatArray:
         equations, at = self._equations, self._estimate.evaluation
         prior = equations.parameters.prior
-        stated = np.isfinite(prior)
+        chosen = equations.parameters
+        stated = np.isfinite(prior) & ~chosen.uncertain
         centre = at.theta.copy()
         centre[stated] += random.standard_normal(int(stated.sum())) * prior[stated]
+        if len(chosen.spread):
+            root = np.linalg.cholesky(chosen.spread)
+            centre[chosen.uncertain] += root @ random.standard_normal(len(root))
         signs = np.where(random.integers(0, 2, int(self._pose.max()) + 1), 1.0, -1.0)
         left = signs[self._pose] * self._left
         drawn, _ = equations.parameters.off_functions(at.theta)

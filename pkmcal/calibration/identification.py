@@ -16,6 +16,7 @@ from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray, as_rows, propagate
 from pkmcal.calibration import summary
 from pkmcal.core import instruments
+from pkmcal.diagnostics.breakeven import Breakeven, breakeven, in_words
 from pkmcal.diagnostics.checks import AT_ONCE, CHECKS
 from pkmcal.diagnostics.diagnosis import Diagnosis
 from pkmcal.diagnostics.drift import Drift
@@ -24,12 +25,12 @@ from pkmcal.diagnostics.measuring_order import MeasuringOrder
 from pkmcal.diagnostics.moved import Moved
 from pkmcal.diagnostics.verdict import Verdict, diagnose
 from pkmcal.display import Table
-from pkmcal.effects.expansion import in_words
+from pkmcal.effects.expansion import in_words as heat_in_words
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
+from pkmcal.fitted.held_numbers import considered_places
 from pkmcal.fitted.row_names import row_names
-from pkmcal.fitted.solution import Solution
+from pkmcal.fitted.solution import Machine, Solution
 from pkmcal.kinematics.calibratable import as_machine
-from pkmcal.kinematics.robot import Robot
 from pkmcal.result import Result
 
 if TYPE_CHECKING:
@@ -40,7 +41,7 @@ _ALIKE = 9  # decimals to which correlations differ that are not equal
 _UNIDENTIFIABLE = 1e-3  # mm a pose moves per mm along an unidentifiable combination
 
 
-class Identification(Solution, Result):
+class Identification(Solution[Machine], Result):
     """What `identify` found. Arrays are in the order of `free`; mm and rad.
 
     Its numbers are attributes that its base classes describe: `Solution`, and `HeldOut` for points
@@ -92,6 +93,14 @@ class Identification(Solution, Result):
         return found
 
     @cached_property
+    def breakeven(self) -> tuple[Breakeven, ...]:
+        """How wrong numbers that are not free may be before standard deviations are double.
+
+        Of lengths, angles and ratios; without those whose uncertainty is stated.
+        """
+        return breakeven(self.fit)
+
+    @cached_property
     def law_tests(self) -> tuple[LawTest, ...]:
         """Whether the free numbers of drive laws are needed: an F test of each kind against 0.
 
@@ -99,7 +108,7 @@ class Identification(Solution, Result):
         """
         if isinstance(self.robot, SerialArm):
             return ()
-        prior = np.asarray(self.fit.estimate.prior.any(axis=0))
+        prior = np.asarray(self.fit.estimate.prior.any(axis=0))[self.columns]
         return law_tests(self.robot.geometry, self, self.fit.uncertainty, prior)
 
     @property
@@ -135,7 +144,7 @@ class Identification(Solution, Result):
             "change": self.values - self.start,
         }
 
-    def robot_of(self, session: str) -> Robot | SerialArm:
+    def robot_of(self, session: str) -> Machine:
         """The machine with the numbers that it had in a session.
 
         Parameters
@@ -192,7 +201,17 @@ class Identification(Solution, Result):
         by_numbers = machine.error_twists(at, actuators)[:, :, chosen.places]
         by_geometry = instruments.points(at, place)[1] @ by_numbers
         own = chosen.geometry_of(session)
-        deviation = np.sqrt(propagate(by_geometry, self.fit.covariance[np.ix_(own, own)]))
+        variance = propagate(by_geometry, self.fit.covariance[np.ix_(own, own)])
+        sure = self.fit.uncertainty
+        if sure.considered is not None:  # what they move by themselves is no more independent
+            follow = sure.reported[own] @ sure.considered
+            places, root = considered_places(chosen)
+            alone = machine.error_twists(at, actuators)[:, :, places]
+            moved_by = instruments.points(at, place)[1] @ alone @ root - by_geometry @ follow
+            variance += (moved_by**2).sum(axis=(1, 2)) - ((by_geometry @ follow) ** 2).sum(
+                axis=(1, 2)
+            )
+        deviation = np.sqrt(variance)
         undetermined = self.fit.undetermined() * chosen.scale[:, None]
         moved = np.linalg.norm(by_geometry @ undetermined[own], axis=(1, 2))
         return np.where(moved < _UNIDENTIFIABLE, deviation, np.inf).reshape(shape)
@@ -280,11 +299,11 @@ class Identification(Solution, Result):
         verdict = self.verdict
         yield summary.filled("", str(verdict))
         yield from (summary.filled("  also: ", text) for text in verdict.reasons[1:])
-        yield from (summary.filled("  note: ", text) for text in verdict.remarks)
+        yield from summary.notes(verdict.remarks)
         yield f"{self.robot.name}: {len(self.free)} parameters from {summary.counts(self.read)}"
         if self.sessions:
             yield summary.sessions(self.sessions)
-        if heat := in_words(
+        if heat := heat_in_words(
             self.fit.equations.table.sets, self.expansion, self.fit.parameters.robot
         ):
             yield summary.filled("", heat)
@@ -305,6 +324,10 @@ class Identification(Solution, Result):
         yield from (summary.filled("", str(test)) for test in self.law_tests)
         if self.at_bounds:
             yield summary.bounds(self.at_bounds)
+        if self.nuisances:
+            yield summary.fitted_along(self.nuisances)
+        if doubled := in_words(self.breakeven):
+            yield summary.filled("", doubled)
         yield ""
         yield from summary.parameter_rows(self)
         if self.holdout_own:

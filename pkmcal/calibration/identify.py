@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Literal, TypeVar, cast
 
-from pkmcal.arguments import earlier_keywords, words
+from pkmcal.arguments import earlier_keywords, word, words
 from pkmcal.arms.arm import SerialArm
 from pkmcal.calibration.asked import (
     EARLIER,
@@ -21,7 +23,6 @@ from pkmcal.calibration.identification import Identification
 from pkmcal.calibration.steps import (
     begin,
     compare,
-    judged,
     prepare,
     result,
     solve,
@@ -31,20 +32,27 @@ from pkmcal.calibration.steps import (
     without_slack,
 )
 from pkmcal.diagnostics.row_errors import likely_mistakes
+from pkmcal.diagnostics.sag import sag_that_helps
 from pkmcal.effects.effect import Effects
 from pkmcal.estimation.datasets import as_fit_data, by_set
 from pkmcal.estimation.free_parameters import parameters
+from pkmcal.estimation.held_coefficients import coefficients, of_the_machine, with_held
+from pkmcal.estimation.own_residuals import Residual, checked_residuals
 from pkmcal.estimation.parameters import Asked, Bounds, Prior
+from pkmcal.estimation.uncertain_numbers import uncertain_sets
 from pkmcal.exceptions import ArgumentError, CalibrationWarning
 from pkmcal.fitted.dropped import Drop, left_out
+from pkmcal.geometry.stated_uncertainty import Uncertain, stated_uncertainty
 from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
 
+Given = TypeVar("Given", bound=Robot | SerialArm)
+
 
 @earlier_keywords(*EARLIER, now=now)
 def identify(
-    robot: Robot | SerialArm,
+    robot: Given,
     measurements: Measurements | Sequence[Measurements],
     free: str | Sequence[str] | None = None,
     *,
@@ -56,8 +64,10 @@ def identify(
     per_session: str | Sequence[str] = (),
     fix: str | Sequence[str] = (),
     drop: Drop = None,
-    effects: Effects = (),
-) -> Identification:
+    effects: Effects | Literal["auto"] = (),
+    uncertainty: Uncertain = None,
+    residuals: Residual | Sequence[Residual] = (),
+) -> Identification[Given]:
     """Find the geometry that agrees best with measurements.
 
     Weighted least squares on the measured quantities, through the forward kinematics and its
@@ -114,8 +124,8 @@ def identify(
         number; of a session that is held out such numbers are found from its rows, before these
         are compared with the fit.
     fix : str or sequence of str
-        Numbers of the geometry, by name or wildcard, that keep their present values though `free`
-        or the robot's default set has them.
+        Numbers of the geometry and coefficients of effects, by name or wildcard, that keep their
+        present values though `free`, the robot's default set or the effect has them.
 
         The word "datum" holds as many numbers as the measurements leave open of where the base
         frame and the platform frame lie, and of how the frames between an arm's joints are drawn:
@@ -130,8 +140,28 @@ def identify(
         "slack": readings of cables that the others show to be slack, on a machine with more cables
         than needed; the rest of their rows is kept. They are `Identification.slack`; without the
         word a warning names them.
-    effects : sequence of effects
-        What moves the machine off the pose that its geometry gives: ``[pk.Expansion(11.5e-6)]``.
+    effects : sequence of effects, or "auto"
+        What moves the machine off the pose that its geometry gives: ``[pk.Expansion(11.5e-6)]``,
+        by loads of the rows ``[pk.Elasticity("offset*")]``,
+        of an arm ``[pk.Sag()]``. "auto": sag of an arm, if it helps at poses left out.
+    uncertainty : mapping of str to float, optional
+        How wrong numbers may be that are neither free nor held by `fix`: standard deviations by
+        name or wildcard, mm, rad or 1, later entries before earlier ones, 0 of what is exact. They
+        stand behind those of the robot file. Such numbers are fitted along, with this as a prior
+        about their present values, and are in the result only if they moved by more than twice
+        that: `Identification.nuisances`. ``target*``, ``frame*`` and the like mean what readings
+        depend on, ``scale`` the scale of the instrument (20e-6).
+
+        Under "common" are deviations of one amount by which all numbers are wrong alike, of points
+        each coordinate: ``{"common": {"target*": 0.3}}``. Under "consider" are those of numbers of
+        the geometry that are to stay exactly where they are: nothing but ± allows for them.
+    residuals : function or sequence of functions
+        What else is known, as functions of numbers by name (mm, rad, 1: all of the geometry, and
+        what is found beside it; of a session ``offset5@thursday``): each gives one residual or
+        several, in standard deviations, that are to be 0. They are fitted as a prior is.
+        Derivatives are found by differences, unless the function gives a pair: its residuals and
+        their derivatives by name, ``(r, {"base1.x": dr})``. Its attribute ``numbers`` may state
+        more numbers to be found, by name where each starts, in mm or as ``(value, unit)``.
 
     Returns
     -------
@@ -163,13 +193,32 @@ def identify(
     >>> round(found.robot.geometry["offset1"], 6)
     0.3
     """
+    if isinstance(effects, str):
+        word("effects", effects, ("auto",))
+        return _automatic(
+            partial(
+                identify, robot, measurements, free, prior=prior, loss=loss, unknown=unknown,
+                holdout=holdout, bounds=bounds, per_session=per_session,
+                fix=fix, drop=drop, residuals=residuals,
+            )
+        )  # fmt: skip
     machine = as_machine(robot)
     roles, own = unknown_roles(unknown), words("per_session", per_session)
     fixed, find_datum = fixed_names(fix)
-    asked = Asked(free, prior, bounds, own, by_set(roles), fixed)
-    moving = effects_on(machine, effects)
+    stated = machine.model.uncertainty.with_later(stated_uncertainty(uncertainty))
+    machine, moving, of_effects = effects_on(machine, effects)
     weighed, rule = loss_and_rule(loss)
     given = as_fit_data(machine, measurements, roles, bool(own), moving)
+    of_machine = partial(
+        of_the_machine, coefficients=coefficients(given), names=machine.geometry.names
+    )
+    given, uncertain = uncertain_sets(machine, with_held(given, fixed), stated)
+    asked = Asked(
+        None if free is None else of_machine(words("free", free)), prior, bounds, own,
+        by_set(roles), of_machine(fixed),
+        of_effects=of_effects, uncertainty=stated, uncertain_roles=uncertain,
+        residuals=checked_residuals(residuals),
+    )  # fmt: skip
     named, drop_outliers, drop_slack = left_out(drop, sum(len(data.rows) for data in given))
     rows = prepare(machine, given, holdout, named, bool(own))
     chosen = parameters(machine, rows.fitted, asked)
@@ -179,18 +228,30 @@ def identify(
             rows, problem = without_outliers(rows, problem, chosen)
         if drop_slack:
             problem = without_slack(problem)
-        fitted = solve(problem, weighed)
+        fit = solve(problem, weighed, rule)
         if find_datum:
-            fitted = with_datum(fitted, rows, asked)
+            fit = with_datum(fit, rows, asked)
     except ValueError as error:
         hint = likely_mistakes(rows.fitted, chosen, problem.start)
         if not hint and not problem.start.ok:
             hint = ["check units, signs and columns of their actuators, or leave these rows out"]
         raise ArgumentError("; ".join([f"measurements: {error}", *hint])) from None
-    fitted = with_component_noise(fitted)
-    sure = judged(fitted, rule)
-    rows, held = compare(rows, fitted, sure, drop_outliers)
-    found = result(rows, fitted, sure, held, find_slack=not drop_slack)
+    fit = with_component_noise(fit)
+    rows, held = compare(rows, fit, drop_outliers)
+    found = result(rows, fit, held, find_slack=not drop_slack)
     for text in found.warnings:
         warnings.warn(text, CalibrationWarning, stacklevel=3)  # of who called, beyond the adapter
+    return cast("Identification[Given]", found)  # an arm for an arm
+
+
+def _automatic(identified: Callable[..., Identification[Given]]) -> Identification[Given]:
+    """The calibration with the sag that helps at poses left out, or else without."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", CalibrationWarning)
+        found = identified(effects=())
+    helps = sag_that_helps(found.fit)
+    if helps is not None and helps.effect is not None:
+        return identified(effects=[helps.effect])
+    for text in found.warnings:
+        warnings.warn(text, CalibrationWarning, stacklevel=4)  # of who called, beyond the adapter
     return found

@@ -1,9 +1,9 @@
 """The steps of `identify`: each takes what the one before returned, and changes nothing of it.
 
     prepare → begin → without_outliers → without_slack → solve → with_datum → with_component_noise
-            → judged → compare → result
+            → compare → result
 
-`Rows` says which rows there are, `Problem` what is solved, `Fitted` what came of it.
+`Rows` says which rows there are, `Problem` what is solved, `Fit` what came of it.
 """
 
 from __future__ import annotations
@@ -11,36 +11,29 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
 from pkmcal.arms.arm import SerialArm
-from pkmcal.arrays import IntArray
 from pkmcal.calibration.identification import Identification
 from pkmcal.estimation.begin import begun, estimator_at
 from pkmcal.estimation.datasets import as_fitted, informative
 from pkmcal.estimation.equations import Equations
-from pkmcal.estimation.estimate import Estimate
 from pkmcal.estimation.estimator import Estimator
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.free_parameters import parameters
 from pkmcal.estimation.loss import LossName
 from pkmcal.estimation.parameters import Asked, Parameters
+from pkmcal.estimation.pose_minima import solved_in_least_minima
 from pkmcal.estimation.starts import known_distances
 from pkmcal.estimation.uncertainty import (
-    LinearModel,
-    Uncertainty,
-    solved,
-    uncertainty,
     unlike_components,
 )
 from pkmcal.exceptions import ArgumentError
-from pkmcal.fitted.datum import NO_DATUM, Datum
 from pkmcal.fitted.datum import datum as choose_datum
 from pkmcal.fitted.dropped import held_without, robust_outliers, without
-from pkmcal.fitted.fit import Fit
+from pkmcal.fitted.fit import Fit, Problem
 from pkmcal.fitted.fit_statistics import (
     identifiability,
     misfit,
@@ -120,41 +113,10 @@ def prepare(
     return replace(rows, fitted=[*rows.fitted, *known_distances(list(rows.fitted))])
 
 
-@dataclass(frozen=True, eq=False)
-class Problem:
-    """Equations to be solved.
-
-    Attributes
-    ----------
-    equations : Equations
-        Of the fitted rows.
-    exact : Equations
-        With poses that follow from the actuators exactly; the same ones where poses have no
-        unknowns.
-    start : Evaluation
-        Where these begin: at the nominal machine, unknown frames aligned with the readings.
-    slack : tuple of Cell
-        Readings of slack cables that are left out.
-    """
-
-    equations: Equations
-    exact: Equations
-    start: Evaluation
-    slack: tuple[Cell, ...] = ()
-
-    def of(self, equations: Equations) -> Problem:
-        """Other equations, from the same start."""
-        return replace(self, equations=equations, exact=equations.with_exact_actuators())
-
-    def estimator(self, loss: LossName) -> Estimator:
-        """The search from the start; an error where rows are not reached."""
-        return estimator_at(self.equations, self.exact, self.start, loss)
-
-
 def begin(rows: Rows, chosen: Parameters) -> Problem:
     """State the problem at the nominal machine."""
     problem = Problem(*begun(rows.fitted, chosen, rows.missing))
-    if rows.held and problem.equations.closures.cells:
+    if rows.held and problem.equations.machines.cells:
         raise ArgumentError("holdout: rows whose tensions are unknown are all fitted: leave it out")
     _require_predictions(problem)
     return problem
@@ -189,82 +151,49 @@ def without_slack(problem: Problem) -> Problem:
     return replace(problem.of(equations), slack=cells) if cells else problem
 
 
-@dataclass(frozen=True, eq=False)
-class Fitted:
-    """A problem that is solved.
-
-    Attributes
-    ----------
-    problem : Problem
-        The problem.
-    estimator, estimate : Estimator, Estimate
-        The search and its end.
-    datum : Datum
-        Numbers that are held because they only say where frames lie.
-    classes : ndarray of int (M,) or None
-        Classes of equations whose noise was told apart.
-    """
-
-    problem: Problem
-    estimator: Estimator
-    estimate: Estimate
-    datum: Datum = NO_DATUM
-    classes: IntArray | None = None
-
-    @cached_property
-    def linear(self) -> LinearModel:
-        """The linear model at the solution."""
-        return solved(self.estimator, self.estimate)
+def solve(problem: Problem, loss: LossName, rule: CovarianceRule) -> Fit:
+    """Search from the start of the problem; an error where rows are not reached."""
+    estimator = estimator_at(problem.equations, problem.exact, problem.start, loss)
+    return Fit(problem, estimator, solved_in_least_minima(estimator), rule=rule)
 
 
-def solve(problem: Problem, loss: LossName) -> Fitted:
-    """Search from the start of the problem."""
-    estimator = problem.estimator(loss)
-    return Fitted(problem, estimator, estimator.solve())
-
-
-def with_datum(fitted: Fitted, rows: Rows, asked: Asked) -> Fitted:
+def with_datum(fit: Fit, rows: Rows, asked: Asked) -> Fit:
     """Hold numbers that only say where frames lie, and solve again; slack cables stay left out."""
-    held = choose_datum(fitted.estimator, fitted.estimate)
+    held = choose_datum(fit.estimator, fit.estimate)
     if not held.names:
-        return replace(fitted, datum=held)
+        return replace(fit, datum=held)
     problem = begin(rows, parameters(rows.machine, rows.fitted, held.asked(asked)))
-    if cells := fitted.problem.slack:
+    if cells := fit.problem.slack:
         keys = [(cell.pose, cell.closures[0]) for cell in cells]
-        equations = problem.equations.without_closures(keys, fitted.estimate.evaluation)
+        equations = problem.equations.without_closures(keys, fit.estimate.evaluation)
         problem = replace(problem.of(equations), slack=cells)
-    return replace(solve(problem, fitted.estimator.loss), datum=held)
+    return replace(solve(problem, fit.estimator.loss, fit.rule), datum=held)
 
 
-def with_component_noise(fitted: Fitted) -> Fitted:
+def with_component_noise(fit: Fit) -> Fit:
     """Weigh components by what each scatters, where that is unlike, and solve again."""
-    estimator, estimate = fitted.estimator, fitted.estimate
-    unlike = unlike_components(estimator, estimate, fitted.linear)
+    estimator, estimate = fit.estimator, fit.estimate
+    unlike = unlike_components(estimator, estimate, fit.linear)
     if unlike is None:
-        return fitted
+        return fit
     classes, deviations = unlike
-    problem = fitted.problem.of(fitted.problem.equations.reweighted(deviations))
+    problem = fit.problem.of(fit.problem.equations.reweighted(deviations))
     again = Estimator(problem.equations, estimator.start, estimator.loss)
     try:
         estimate = again.solve(estimate.evaluation)
     except ArgumentError:  # grossly off: what there is says more than an error
-        return fitted
-    return replace(fitted, problem=problem, estimator=again, estimate=estimate, classes=classes)
+        return fit
+    return replace(fit, problem=problem, estimator=again, estimate=estimate, classes=classes)
 
 
-def judged(fitted: Fitted, rule: CovarianceRule) -> Uncertainty:
-    """How sure the numbers are."""
-    return uncertainty(fitted.estimator, fitted.estimate, fitted.linear, rule, fitted.classes)
-
-
-def compare(rows: Rows, fitted: Fitted, sure: Uncertainty, outliers: bool) -> tuple[Rows, HeldOut]:
+def compare(rows: Rows, fit: Fit, outliers: bool) -> tuple[Rows, HeldOut]:
     """Compare the points held out; with `outliers` without those that are off where few are."""
-    held = evaluate(rows.held, fitted.estimator, fitted.estimate, sure)
+    held = evaluate(rows.held, fit.estimator, fit.estimate, fit.uncertainty)
     odd = held.holdout_outliers
     if outliers and odd and not held.holdout_contradicts:
         names = row_names(held.holdout_data, odd)
         kept = held_without(rows.held, odd)
-        held = evaluate(kept, fitted.estimator, fitted.estimate, sure)
+        held = evaluate(kept, fit.estimator, fit.estimate, fit.uncertainty)
         if rows.drawn:
             rows = replace(rows, held=kept, dropped=tuple(sorted({*rows.dropped, *odd})))
         else:
@@ -272,22 +201,17 @@ def compare(rows: Rows, fitted: Fitted, sure: Uncertainty, outliers: bool) -> tu
     return rows, replace(held, holdout_drawn=rows.drawn)
 
 
-def result(
-    rows: Rows, fitted: Fitted, sure: Uncertainty, held: HeldOut, find_slack: bool
-) -> Identification:
+def result(rows: Rows, fit: Fit, held: HeldOut, find_slack: bool) -> Identification:
     """Set all numbers, once; with `find_slack` also which cables the fit shows to be slack."""
-    estimator, estimate, problem = fitted.estimator, fitted.estimate, fitted.problem
+    estimator, estimate, problem, sure = fit.estimator, fit.estimate, fit.problem, fit.uncertainty
     chosen = estimator.equations.parameters
-    exact, end = problem.exact, estimate.evaluation
-    robots = _robots(exact, end)
-    if exact is not estimator.equations:
-        exact = exact.with_tension(end.states.tension)
-        end = exact.at(end.theta, near=end)
-    fits = misfit(estimator, estimate, sure, (problem.start, end))
+    robots = _robots(problem.exact, estimate.evaluation)
+    fits = misfit(estimator, estimate, sure, (fit.start, fit.end))
     cells = _found_slack(problem) if find_slack and fits["outliers"] else problem.slack
+    table = parameter_table(estimator, estimate, sure)
     return Identification(
-        **parameter_table(estimator, estimate, sure),
-        **identifiability(estimator, estimate),
+        **table,
+        **identifiability(estimator, estimate, len(chosen) - len(table["free"])),
         **fits,
         **repeats(sure),
         **vars(held),
@@ -297,8 +221,9 @@ def result(
         robot=robots[chosen.sessions[-1] if chosen.sessions else ""],
         robots=_of_sessions(robots, held),
         prior_test=tested_prior(estimator, estimate),
-        fit=Fit(exact, problem.start, end, estimate, sure),
-        datum=fitted.datum,
+        uncertainty_test=tested_prior(estimator, estimate, of_uncertain=True),
+        fit=fit,
+        datum=fit.datum,
         dropped=rows.dropped,
         dropped_names=row_names(rows.given, rows.dropped),
         slack=slack_cables(estimator.equations, estimate, cells),

@@ -11,16 +11,31 @@ import numpy as np
 from pkmcal import display
 from pkmcal.arrays import BoolArray
 from pkmcal.display import Table, first_rows
+from pkmcal.estimation.identifiability import listed
 from pkmcal.fitted.distances import Distances
 from pkmcal.fitted.holdout import HeldOut
+from pkmcal.fitted.nuisances import Nuisance
 from pkmcal.fitted.solution import Solution
 from pkmcal.statistics.noise import SIGNIFICANT
 
 _WIDTH = 100  # letters on a line of the terminal
 _SHORT = 12  # rows of a table that is not set side by side
 _BETWEEN = 3  # letters between tables side by side
+_REMARKS = 3  # of a verdict that are shown; the report has all
 _SHARED = 0.5  # of a reading's own noise, from which what its pose shares is said
+WIDER = (
+    "± of loss 'cauchy' are for gross rows among sound ones; where the model itself is wrong, 95 %"
+    " intervals held 73 to 84 % on a real arm, those of loss 'linear' 89 to 96 %"
+)
 _FEW = 10.0  # degrees of freedom below which a standard deviation says too little
+
+
+def notes(remarks: Sequence[str]) -> Iterator[str]:
+    """Remarks of a verdict, as many as a screen takes, and how many more there are."""
+    yield from (filled("  note: ", text) for text in remarks[:_REMARKS])
+    more = len(remarks) - _REMARKS
+    if more > 0:
+        yield f"  {more} more note{'s' * (more > 1)}: in the report (verdict.remarks)"
 
 
 def misfit_table(found: Solution) -> Table:
@@ -192,6 +207,15 @@ def own_numbers(found: HeldOut) -> Table:
     return Table(["found for the points held out", "value"], rows, left=1)
 
 
+def fitted_along(beside: Sequence[Nuisance]) -> str:
+    """How many numbers were fitted along since they are uncertain, and which moved."""
+    far = [each.name for each in beside if each.moved]
+    shown = f"; in the table those that moved by more than twice it: {listed(far)}" if far else ""
+    return filled(
+        "", f"{len(beside)} numbers were fitted along within their stated uncertainty{shown}"
+    )
+
+
 def bounds(names: Sequence[str]) -> str:
     """Which parameters ended at a bound."""
     return filled("at a bound, ± as if it were not there: ", ", ".join(names))
@@ -234,6 +258,8 @@ def parameter_rows(table: Solution) -> Iterator[str | Table]:
             "± are half widths of 95 % intervals, by Student's t: as few as"
             f" {least:.2g} degrees of freedom are left",
         )
+    if table.loss == "cauchy":
+        yield filled("", WIDER)
 
 
 def filled(lead: str, text: str) -> str:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from pkmcal.arrays import FloatArray
 from pkmcal.checks.finding import Finding, named
 from pkmcal.checks.function import outside_workspace, singular, turning
+from pkmcal.geometry.chain_joints import Joint
 from pkmcal.kinematics import pose_steps
 from pkmcal.kinematics.robot import Robot
 
@@ -16,6 +17,8 @@ _NONE = 1e-7  # of the largest: a singular value that is none
 _NEAR = 0.1  # of the distance: a home value that is meant to be it
 _EXACT = 1e-3  # mm
 _AXIS = 0.02  # entries of a direction that are shown as 0
+_TURNS = 4 * np.pi  # rad: no joint of a limb turns further
+_ORDINALS = ("first", "second")
 
 
 def mobility(robot: Robot) -> Iterator[Finding]:
@@ -72,6 +75,51 @@ def strokes(robot: Robot) -> Iterator[Finding]:
             )
 
 
+def stroke_units(robot: Robot) -> Iterator[Finding]:
+    """Strokes of turning joints that run far beyond a turn: degrees taken for radians."""
+    assert robot.model.chains is not None
+    for i, k, joint in _joints(robot):
+        if joint.unit == "rad" and joint.stroke is not None:
+            most = max(map(abs, joint.stroke))
+            if most > _TURNS:
+                yield Finding(
+                    "angle",
+                    (i + 1,),
+                    f"the stroke of {robot.model.chains.name_of(i, k)} runs to"
+                    f" {np.degrees(most):.6g} deg",
+                    f"is {most:.6g} in degrees? See angle under [units]",
+                )
+
+
+def along_its_rod(robot: Robot) -> Iterator[Finding]:
+    """Axes of a U that lie along the rod beside it, which they turn about itself."""
+    assert robot.model.chains is not None
+    for i, k, joint in _joints(robot):
+        limb = robot.model.chains.limbs[i]
+        for rod in (_rod(joint, limb[k + 1 :]), _rod(joint, limb[:k][::-1])):
+            if joint.kind != "U" or rod is None:
+                continue
+            for n, axis in enumerate(joint.axes):
+                if float(np.linalg.norm(np.cross(axis, rod))) < _AXIS:
+                    yield Finding(
+                        "axis",
+                        (i + 1,),
+                        f"the {_ORDINALS[n]} axis of the U {robot.model.chains.name_of(i, k)} lies"
+                        " along its rod, which it turns about itself",
+                        "give the U two axes across the rod; a rod that has to turn about itself"
+                        " is an R",
+                    )
+
+
+def _rod(joint: Joint, others: Sequence[Joint]) -> FloatArray | None:
+    """The direction (3,) to the first of other joints that is elsewhere and no slide."""
+    for other in others:
+        way = other.at - joint.at
+        if other.kind != "P" and np.linalg.norm(way) > _EXACT:
+            return np.asarray(way / np.linalg.norm(way))
+    return None
+
+
 def axes_in_line(robot: Robot) -> Iterator[Finding]:
     """Home at which the actuators move the tool in fewer ways than nearby."""
     home, near = (_ways(robot, q) for _, q in (_home(robot), _away(robot)))
@@ -124,6 +172,8 @@ CHAIN_CHECKS = (
     idle_tail,
     home_values,
     strokes,
+    stroke_units,
+    along_its_rod,
     turning,
     singular_anywhere,
     axes_in_line,
@@ -145,6 +195,18 @@ def surplus(robot: Robot) -> str:
         f" {closures}; what they read can contradict itself: the joints then yield, each by its"
         " `soft`, and it can calibrate itself by their readings"
     )
+
+
+def _joints(robot: Robot) -> Iterator[tuple[int, int, Joint]]:
+    """Every joint once, with a limb that has it and its place there, both counted from 0."""
+    assert robot.model.chains is not None
+    seen: set[str] = set()
+    for i, limb in enumerate(robot.model.chains.limbs):
+        for k, joint in enumerate(limb):
+            name = robot.model.chains.name_of(i, k)
+            if name not in seen:
+                seen.add(name)
+                yield i, k, joint
 
 
 def _home(robot: Robot) -> tuple[FloatArray, FloatArray]:

@@ -121,7 +121,8 @@ def check_geometry(robot: Robot | SerialArm) -> GeometryCheck:
         alike     limbs that are unlike the others
         home      a home that the constraints of limbs do not allow
         stroke    home, or a stroke's ends, that the inverse kinematics cannot use
-        singular  home, or every pose, is singular; affinely similar base and platform
+        singular  home, or every pose, is singular or nearly; affinely similar base and platform
+        axis      an axis of a U along its rod
         drive     drive laws that may turn back within their stroke: they have no inverse
         tension   a home at which not all cables can pull
         load      a sag at home that no machine has: stiffness or masses in other units

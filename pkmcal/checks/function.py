@@ -26,8 +26,13 @@ USUAL = (10.0, 1e5)  # mm: most are; micromachines and machines of cables are no
 _FACTORS = ((1e3, "metres"), (25.4, "inches"), (1e-3, "micrometres"))
 _NOISE, _SAME = 0.005, 1e-4  # of the largest length: errors of joints that are meant to be at 0
 _STEPS = 40  # of a move to the end of a stroke
-_POSES, _SPREAD = 200, 0.2  # drawn around home to look for a pose that is not singular
+_POSES, _NEAR_HOME, _SPREAD = (
+    200,
+    60,
+    0.2,
+)  # drawn around home to look for a pose that is not singular
 _SINGULAR = 1e-7  # conditioning: numerically none
+_BESIDE, _FALL = 0.05, 0.5  # of the length, to which part conditioning must not fall so near home
 _NEARLY = 1e-3
 _AFFINE = 0.01  # of the base's size, by which joints may miss an affine image
 _LENGTHS = {
@@ -323,6 +328,24 @@ def singular(robot: Robot) -> Iterator[Finding]:
             (),
             f"home is singular: conditioning {conditioning[0]:.1e}, elsewhere up to {best:.3g}",
             "choose another home pose; forward() starts there",
+        )
+    else:
+        yield from _beside(robot, poses, float(conditioning[0]))
+
+
+def _beside(robot: Robot, poses: FloatArray, at_home: float) -> Iterator[Finding]:
+    """A home so near to a singularity that the conditioning falls within a small step of it."""
+    steps = _BESIDE / _SPREAD * (poses[:_NEAR_HOME] - robot.home)
+    near = dexterity(robot, completed(robot, robot.home + steps)).conditioning
+    near = near[np.isfinite(near)]
+    if near.size and near.min() < _FALL * at_home:
+        yield Finding(
+            "singular",
+            (),
+            f"home is beside a singularity: conditioning {at_home:.3g}, and {near.min():.2g} within"
+            f" {_BESIDE * robot.length:.3g} mm and {np.degrees(_BESIDE):.3g} deg of it",
+            "choose a home further from it, or joints that are less alike on base and platform;"
+            " near it rows end in other assembly modes and calibrations in other minima",
         )
 
 

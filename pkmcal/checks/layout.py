@@ -20,6 +20,7 @@ from pkmcal.checks.joint_layout import (
     traits,
 )
 from pkmcal.geometry.limb_kinds import KINDS
+from pkmcal.kinematics.pulled import on_cables
 from pkmcal.kinematics.robot import Robot
 
 _SAME = 1e-9  # relative: the same number written twice
@@ -127,14 +128,16 @@ def doubled(robot: Robot) -> Iterator[Finding]:
     base, platform = joints(robot)
     room = 1e-3 * size(robot)
     count = len(robot.model.limbs)
-    both = np.hstack([base.points, platform.points])
+    whole = [_points_of(robot, i) for i in range(count)]
     pairs = combinations(range(count), 2)
     ways = slider_ways(robot)
     crossing = np.linalg.norm(np.cross(ways[:, None], ways), axis=2) > ALIKE  # at a point of both
     copies = [
         (i, j)
         for i, j in pairs
-        if float(np.linalg.norm(both[i] - both[j])) <= room and not crossing[i, j]
+        if whole[i].shape == whole[j].shape
+        and float(np.linalg.norm(whole[i] - whole[j])) <= room
+        and not crossing[i, j]
     ]
     for i, j in copies:
         place = ", ".join(f"{number:.6g}" for number in base.points[i])
@@ -144,7 +147,7 @@ def doubled(robot: Robot) -> Iterator[Finding]:
             f"{named((i, j))} have the same joints; the base joint is at ({place}) mm",
             f"was limb {j + 1} copied from limb {i + 1} and not changed?",
         )
-    if robot.model.map != "spatial":
+    if robot.model.map != "spatial" or on_cables(robot):
         return
     for side in (base, platform):
         near = np.linalg.norm(side.points[:, None] - side.points, axis=2) <= room
@@ -158,6 +161,15 @@ def doubled(robot: Robot) -> Iterator[Finding]:
                 f"{named(shared)} share one {side.side} joint",
                 "no more than two limbs can: check these joints",
             )
+
+
+def _points_of(robot: Robot, limb: int) -> FloatArray:
+    """Coordinates of all points of a limb, those that a cable runs over included, and its parts."""
+    base, platform = joints(robot)
+    geometry, over = robot.geometry, f"over{limb + 1}."
+    others = [geometry[name] for name in geometry.names if name.startswith(over)]
+    parts = robot.model.limbs[limb].parts
+    return np.concatenate([base.points[limb], platform.points[limb], others, parts])
 
 
 def swapped(robot: Robot) -> Iterator[Finding]:

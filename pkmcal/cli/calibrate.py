@@ -14,17 +14,21 @@ import typer
 import pkmcal as pk
 from pkmcal.arguments import word
 from pkmcal.calibration.asked import Role
+from pkmcal.calibration.rigid import rigid_arm
+from pkmcal.cli.effects_option import AUTO, HELP, OPTION, read_effects
 from pkmcal.cli.geometry_options import (
     free_names,
     matching,
     read_coefficients,
     read_prior,
+    read_uncertainty,
 )
 from pkmcal.cli.inputs import Inputs
 from pkmcal.cli.measured import (
     Columns,
     Controller,
     Ignore,
+    InvertPoses,
     JoinBy,
     ProbeOffset,
     Reading,
@@ -34,7 +38,7 @@ from pkmcal.cli.measured import (
     rows_to_drop,
     without_lines,
 )
-from pkmcal.cli.options import Force, Free, Json, Prior, RobotOrArm
+from pkmcal.cli.options import Consider, Force, Free, Json, Prior, RobotOrArm, Uncertainty
 from pkmcal.cli.output import Output, say
 from pkmcal.cli.progress import progress
 from pkmcal.cli.sessions import in_sessions
@@ -48,6 +52,7 @@ from pkmcal.fitted.dropped import Found
 from pkmcal.kinematics.calibratable import Calibratable, as_machine
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.tracker import Tracker
+from pkmcal.readings.unknowns import POINT
 from pkmcal.report.as_json import as_json
 from pkmcal.statistics.covariance import RULES
 
@@ -59,6 +64,8 @@ def calibrate(
     ],
     free: Free = None,
     prior: Prior = None,
+    uncertainty: Uncertainty = None,
+    consider: Consider = None,
     holdout: Annotated[
         str | None,
         typer.Option(
@@ -147,6 +154,7 @@ def calibrate(
             " other parts, or separate them with commas.",
         ),
     ] = None,
+    effects: Annotated[list[str] | None, typer.Option(metavar="WORDS", help=HELP)] = None,
     drop: Annotated[
         list[str] | None,
         typer.Option(
@@ -174,6 +182,7 @@ def calibrate(
     columns: Columns = None,
     units: Units = None,
     rotation: Rotation = None,
+    invert_poses: InvertPoses = False,
     probe_offset: ProbeOffset = None,
     tracker: Annotated[
         str | None,
@@ -222,7 +231,15 @@ def calibrate(
     given = pk.load(read.robot(robot))
     machine = as_machine(given)
     reading = Reading(
-        controller, join, ignore or (), rename or (), columns, units, rotation, probe_offset
+        controller,
+        join,
+        ignore or (),
+        rename or (),
+        columns,
+        units,
+        rotation,
+        probe_offset,
+        invert_poses,
     )
     with warnings.catch_warnings(record=True) as doubts:
         warnings.simplefilter("always", pk.CalibrationWarning)
@@ -259,8 +276,13 @@ def calibrate(
         raise ArgumentError(f"--fix {','.join(fix or [])}: no parameter is left free")
     found_rows: dict[Found, bool] = {"outliers": drop_outliers, "slack": drop_slack}
     held_by_datum = ["datum"] if word("--datum", datum, ("none", "auto")) == "auto" else []
+    moving = read_effects(effects or ["none"])
     weight, rule = word("--loss", loss, LIMITS), word("--covariance", covariance, RULES)
     coefficients = read_coefficients("--expansion", expansion or [])
+    if coefficients is not None:
+        if moving == AUTO:
+            raise ArgumentError(f"{OPTION} auto is for arms, --expansion for other machines")
+        moving = [*moving, pk.Expansion(coefficients)]
     with progress("identifying"), warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # the summary has them
         found = pk.identify(
@@ -274,14 +296,16 @@ def calibrate(
             per_session=anew,
             fix=[*fixed, *held_by_datum],
             drop=[*dropped, *(each for each, asked in found_rows.items() if asked)],
-            effects=[] if coefficients is None else [pk.Expansion(coefficients)],
+            effects=moving,
+            uncertainty=read_uncertainty(uncertainty or [], consider or [], machine),
         )
+    rigid = rigid_arm(found) if output is not None and urdf else None
     if output is not None:
         with progress("picture"), output.draft() as draft:
             _save(found, draft / "robot.toml", read, robot)
             found.plot(draft / "residuals.png")
             if isinstance(found.robot, pk.SerialArm) and urdf:
-                found.robot.save_urdf(draft / "robot.urdf")
+                (rigid.arm if rigid else found.robot).save_urdf(draft / "robot.urdf")
     if reported is not None:
         with progress("report"), reported.draft() as draft:
             found.report(draft, read.contents(), certificate=stated)
@@ -295,7 +319,8 @@ def calibrate(
             say(f"\ncalibrated robot{last}: {output.paths[0]}")
             say(f"residuals: {output.paths[1]}")
             if urdf:
-                say(f"URDF with the joint errors in its origins: {output.paths[2]}")
+                how = f"; {rigid}" if rigid else ""
+                say(f"URDF with the joint errors in its origins: {output.paths[2]}{how}")
         if reported is not None:
             say(f"\nreport: {reported.paths[0]}")
         written = [each for each in (reported, output) if each is not None]
@@ -348,9 +373,14 @@ def _save(found: pk.Identification, path: Path, read: Inputs, robot: str) -> Non
     if isinstance(calibrated, pk.SerialArm) or isinstance(source, str):
         calibrated.save(path, read.comment())
         return
-    columns = found.fit.parameters.geometry_of()
-    names = [calibrated.geometry.names[place] for place in found.fit.parameters.places]
-    known = dict(zip(names, found.stderr[columns].tolist(), strict=True))
+    chosen = found.fit.parameters
+    sigma = {each.name: each.stderr for each in found.nuisances}
+    sigma |= dict(zip(found.free, found.stderr.tolist(), strict=True))
+    names = [calibrated.geometry.names[place] for place in chosen.places]
+    known = {
+        name: sigma[chosen.names[column]]
+        for name, column in zip(names, chosen.geometry_of().tolist(), strict=True)
+    }
     calibrated.save(path, read.comment(), like=source, deviations=known)
 
 
@@ -378,7 +408,7 @@ def read_tracker(text: str) -> Tracker:
 
 
 def _seen_by(tracker: Tracker, measured: Measurements) -> Measurements:
-    if measured.kind != "position":
+    if measured.instrument.components != POINT:
         raise ArgumentError(
             f"--tracker: a tracker measures positions, the file has {measured.kind}s"
         )

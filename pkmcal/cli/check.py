@@ -14,6 +14,7 @@ from pkmcal.cli.measured import (
     Columns,
     Controller,
     Ignore,
+    InvertPoses,
     JoinBy,
     ProbeOffset,
     Reading,
@@ -41,6 +42,7 @@ def check(
     columns: Columns = None,
     units: Units = None,
     rotation: Rotation = None,
+    invert_poses: InvertPoses = False,
     probe_offset: ProbeOffset = None,
     json: Json = False,
 ) -> int:
@@ -58,7 +60,15 @@ def check(
     measured = None
     if measurements is not None:
         reading = Reading(
-            controller, join, ignore or (), rename or (), columns, units, rotation, probe_offset
+            controller,
+            join,
+            ignore or (),
+            rename or (),
+            columns,
+            units,
+            rotation,
+            probe_offset,
+            invert_poses,
         )
         measured = reading.measurements(measurements, read, as_machine(machine))
     found = pk.check_geometry(machine)

@@ -13,6 +13,7 @@ from pkmcal.cli.inputs import Inputs
 from pkmcal.cli.options import Force, Json, ParallelRobot
 from pkmcal.cli.output import Output, say
 from pkmcal.controllers.linuxcnc import contents
+from pkmcal.controllers.loss import laws
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.reading import Input
 from pkmcal.loading import load_parallel
@@ -104,6 +105,8 @@ def _export_arm(
     arm: object = pk.load(robot)
     if not isinstance(arm, pk.SerialArm):
         raise ArgumentError(f"{robot}: --as {target} is for serial arms")
+    lost = None if arm.laws is None else laws(arm)
+    arm = arm.rigid
     with Output(out.parent, [out.name], read, force).draft() as draft:
         if target == "urdf":
             pk.export.urdf(arm, draft / out.name)
@@ -116,11 +119,11 @@ def _export_arm(
     if json:
         say(
             as_json(
-                {"robot": arm.name, "as": target, "file": str(out), "loss": None}, schema="export"
+                {"robot": arm.name, "as": target, "file": str(out), "loss": lost}, schema="export"
             )
         )
     else:
-        say(f"{out}: {arm.name}")
+        say(f"{out}: {arm.name}" + (f"; {lost}" if lost and not lost.exact else ""))
     return 0
 
 

@@ -10,6 +10,7 @@ from pkmcal.core.library import POSE
 from pkmcal.estimation.prior_functions import terms
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.units import UNITS
+from pkmcal.geometry.stated_uncertainty import COMMON, CONSIDER
 from pkmcal.kinematics.calibratable import Calibratable
 
 _FRAME = dict(zip(POSE, ("mm", "mm", "mm", "rad", "rad", "rad"), strict=True))
@@ -128,6 +129,39 @@ def read_prior(
                 raise ArgumentError(f"--prior {text}: {error}") from None
             stated[name] = value, sigma
     return stated
+
+
+def read_uncertainty(
+    given: Sequence[str], consider: Sequence[str], robot: Calibratable
+) -> dict[str, float | Mapping[str, float]]:
+    """What ``--uncertainty`` and ``--consider`` state, as `identify` takes it.
+
+    Raises
+    ------
+    ValueError
+        No number, a unit that does not fit, a wildcard over lengths and angles, no name.
+    """
+    parts: dict[bool, list[str]] = {True: [], False: []}
+    for text in given:
+        stated, _, word = text.partition(",")
+        if word.strip() not in ("", COMMON):
+            raise ArgumentError(f"--uncertainty {text}: expected NAME=σ or NAME=σ,{COMMON}")
+        parts[bool(word)].append(stated)
+    found: dict[str, float | Mapping[str, float]] = {}
+    found |= _named("--uncertainty", parts[False], robot)
+    beside = {
+        COMMON: _named("--uncertainty", parts[True], robot),
+        CONSIDER: _named("--consider", consider, robot),
+    }
+    return found | {key: own for key, own in beside.items() if own}
+
+
+def _named(option: str, given: Sequence[str], robot: Calibratable) -> Mapping[str, float]:
+    """Deviations, each with a name."""
+    found = read_deviations(option, given, robot, robot.geometry.names)
+    if isinstance(found, float):
+        raise ArgumentError(f"{option} {given[0]}: expected NAME=NUMBER, such as 'gain*=1e-3'")
+    return found or {}
 
 
 def _pair(pair: re.Match[str] | None, robot: Calibratable) -> tuple[str, float, float]:

@@ -86,6 +86,6 @@ def import_file(
 def _tables(printer: pk.export.Printer) -> dict[str, Measurements]:
     """What was measured, by the file it is written to."""
     stored = printer.measurements
-    places = stored is not None and stored.kind == "closure"
+    places = stored is not None and not stored.components
     found = {"belts.csv" if places else "probe.csv": stored, "distances.csv": printer.distances}
     return {name: measured for name, measured in found.items() if measured is not None}

@@ -49,7 +49,7 @@ def carrying(
     if payload_at is not None and payload is None:
         raise ArgumentError("--payload-at is the centre of a payload: --payload is missing")
     load = Load(
-        0.0 if payload is None else _mass(payload),
+        0.0 if payload is None else mass("--payload", payload),
         _three("--payload-at", payload_at),
         _three("--tool-force", tool_force),
     )
@@ -71,14 +71,15 @@ def yielding(robot: Robot, compliances: list[str] | None) -> Robot:
     return robot.yielding(found) if found else robot
 
 
-def _mass(text: str) -> float:
+def mass(option: str, text: str) -> float:
+    """A mass in kg, of a number with or without a unit."""
     match = _MASS.fullmatch(text.strip().lower())
     try:
         assert match is not None
         return typed(match[1]) * _MASSES[match[2]]
     except (ValueError, KeyError):
         units = ", ".join(unit for unit in _MASSES if unit)
-        raise ArgumentError(f"--payload must be a mass in {units}, found {text!r}") from None
+        raise ArgumentError(f"{option} must be a mass in {units}, found {text!r}") from None
 
 
 def _three(option: str, text: str | None) -> tuple[float, float, float]:

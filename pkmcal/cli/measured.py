@@ -67,6 +67,14 @@ Rotation = Annotated[
 ]
 
 
+InvertPoses = Annotated[
+    bool,
+    typer.Option(
+        "--invert-poses",
+        help="Poses are those of the base in the platform's frame: a camera on the platform saw a"
+        " board on the base.",
+    ),
+]
 ProbeOffset = Annotated[
     str | None,
     typer.Option(
@@ -89,6 +97,7 @@ class Reading:
     units: str | None = None
     rotation: str | None = None
     probe_offset: str | None = None
+    invert_poses: bool = False
 
     def measurements(self, path: str | Path, read: Inputs, robot: Calibratable) -> Measurements:
         """The measurements of a file; what was assumed is printed to stderr, a line each."""
@@ -101,6 +110,8 @@ class Reading:
             stated["units"] = [unit.strip() for unit in self.units.split(",")]
         if self.rotation is not None:
             stated["rotation"] = self.rotation
+        if self.invert_poses:
+            stated["invert_poses"] = True
         if self.probe_offset is not None:
             stated["probe_offset"] = _offset(self.probe_offset)
         log = None if self.controller is None else read.file(self.controller)

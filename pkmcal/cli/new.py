@@ -31,6 +31,8 @@ _PARALLEL = """\
 # [pose]        map: the coordinates it moves in; home: a pose in the middle of the workspace
 # [parameters]  names for numbers that limbs share: `radius = 160.0` here, "radius" there
 # [calibration] free: what is found unless --free says otherwise; wildcards are allowed
+# [uncertainty] how wrong numbers may be that are not found, one standard deviation:
+#               `"gain*" = 1e-3`, `"base*" = 0.05`; common = { "gain*" = 1e-3 }: all alike
 # [frames]      base, tool: poses of the machine's frames in yours, if they differ
 # [stated]      what a data sheet claims, to compare: `rod = 340.0`
 # [[limb]]      one for each, counted from 1 in the names of its numbers (base1.x, offset1 …)

@@ -50,6 +50,22 @@ Prior = Annotated[
         " '|base1 - base2|=3000±1'.",
     ),
 ]
+Uncertainty = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="NAME=σ[,common]",
+        help="How wrong a number may be that is not found, one standard deviation: 'gain*=1e-3',"
+        " 'target*=0.1', scale=20e-6 of the instrument. It is fitted along within that. common:"
+        " all numbers that this names are wrong by one and the same amount.",
+    ),
+]
+Consider = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="NAME=σ",
+        help="The same of a number that has to stay where it is: ± alone allow for it.",
+    ),
+]
 Poses = Annotated[
     Path | None,
     typer.Option(

@@ -14,6 +14,7 @@ from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray
 from pkmcal.cli.geometry_options import free_names, read_prior
 from pkmcal.cli.inputs import Inputs
+from pkmcal.cli.load_options import Yielding, mass, yielding
 from pkmcal.cli.options import Force, Free, Json, Prior, RobotOrArm, Seed
 from pkmcal.cli.output import Output, say
 from pkmcal.cli.progress import progress
@@ -97,6 +98,15 @@ def plan(
             " 5 % larger. 0: nothing.",
         ),
     ] = 0.0,
+    payloads: Annotated[
+        str | None,
+        typer.Option(
+            metavar="MASS,MASS",
+            help="What a machine that yields carries in turn, such as 0,100kg; of its file by"
+            " default.",
+        ),
+    ] = None,
+    compliance: Yielding = None,
     free: Free = None,
     prior: Prior = None,
     unknown: Annotated[
@@ -133,7 +143,7 @@ def plan(
     machine: Robot | SerialArm = load(read.robot(robot))
     box = _box(machine, within or [])
     if isinstance(machine, Robot):
-        machine = machine.within(box)
+        machine = yielding(machine.within(box), compliance)
     seen = as_machine(machine)
     chosen = free_names(seen, free)
     candidates = _drawn(machine, box, seed) if poses is None else _places(machine, read.file(poses))
@@ -158,6 +168,9 @@ def plan(
             noise=_noise(noise, kinds),
             actuator_noise=actuator_noise,
             travel_weight=travel_weight,
+            payloads=[]
+            if payloads is None
+            else [mass("--payloads", m) for m in payloads.split(",")],
             free=chosen or None,
             prior=read_prior(prior or [], seen, chosen),
             unknown=[word("--unknown", each, UNKNOWN) for each in unknown or ()],
@@ -288,15 +301,18 @@ def _places(machine: Robot | SerialArm, path: PathLike[str]) -> FloatArray:
 def _write(made: Plan, out: Path, head: str) -> None:
     kinds = list(dict.fromkeys(made.kinds))
     several = {"kind": made.kinds} if len(kinds) > 1 else {}
-    write_poses(out / "poses.csv", made.poses, several, comment=head)
+    carried = {} if made.load is None else {"payload [kg]": np.asarray(made.load.mass)}
+    write_poses(out / "poses.csv", made.poses, {**several, **carried}, comment=head)
     for kind in kinds:
         points = made.target.get(kind, np.empty((1, 0)))
-        mine = made.actuators[np.array(made.kinds) == kind]
+        own = np.array(made.kinds) == kind
+        mine = made.actuators[own]
         at = np.tile(points, (len(mine), 1))
         write_commands(
             out / (f"commands-{kind}.csv" if several else "commands.csv"),
             reading_units(made.robot),
             np.repeat(mine, len(points), axis=0),
-            {f"target.{axis} [mm]": place for axis, place in zip("xyz", at.T, strict=False)},
+            {f"target.{axis} [mm]": place for axis, place in zip("xyz", at.T, strict=False)}
+            | {name: np.repeat(kg[own], len(points)) for name, kg in carried.items()},
             comment=head,
         )

@@ -18,6 +18,7 @@ from pkmcal.arrays import BoolArray, FloatArray, as_numbers, as_rows, rms
 from pkmcal.core.library import POSE
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.atomic import write_whole
+from pkmcal.geometry.carried import Load
 from pkmcal.kinematics.kinematics import Match
 from pkmcal.kinematics.perturbed import ideal
 from pkmcal.kinematics.reading_units import reading_units
@@ -158,6 +159,7 @@ def correction_grid(
     method: Interpolation = "linear",
     origin: ArrayLike | None = None,
     match: Match = None,
+    load: Load | None = None,
 ) -> CorrectionGrid:
     """Tabulate the difference of two machines' inverse kinematics over a grid of poses.
 
@@ -177,6 +179,9 @@ def correction_grid(
         the coordinates that its file declares are kept (`Robot.complete`).
     match : bool or names of coordinates, optional
         Which coordinates the calibrated machine is to keep; see `Robot.inverse`.
+    load : Load, optional
+        What the calibrated machine carries all over the grid, one load, in place of the payload
+        that its file states.
 
     Returns
     -------
@@ -209,6 +214,9 @@ def correction_grid(
             f"calibrated must have the actuators of {robot.name}, {len(robot.actuator_units)};"
             f" {calibrated.name} has {len(calibrated.actuator_units)}"
         )
+    if load is not None:
+        load.rows(())
+        calibrated = calibrated.under(load)
     require_moved(robot, axes)
     names = tuple(sorted(axes, key=POSE.index))
     nodes = tuple(_nodes(name, axes[name], METHODS[method]) for name in names)

@@ -11,6 +11,7 @@ from pkmcal.arguments import path as as_path
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arms.denavit_hartenberg import Convention, DHTable, Parallel
 from pkmcal.arrays import FloatArray
+from pkmcal.controllers.loss import require_plain
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.atomic import write_whole
 from pkmcal.files.csv_writer import write_csv
@@ -48,7 +49,8 @@ def dh(
     DHTable
         What was written: a row a joint, in mm and deg; base and tool in comments.
     """
-    table = instance("arm", arm, SerialArm).dh(convention, parallel)
+    require_plain(instance("arm", arm, SerialArm), "a table of Denavit-Hartenberg numbers")
+    table = arm.dh(convention, parallel)
     leaning = table.beta is not None and bool(table.beta.any())
     comment = (
         f"# {_line(arm.name)}: {convention} Denavit-Hartenberg numbers,"
@@ -95,7 +97,7 @@ def universal_robots(arm: SerialArm, path: str | PathLike[str]) -> DHTable:
     ValueError
         Another arm, or one whose numbers are not of the form of these robots.
     """
-    instance("arm", arm, SerialArm)
+    require_plain(instance("arm", arm, SerialArm), "a calibration.conf")
     if arm.kinds != ("revolute",) * _UR_JOINTS:
         raise ArgumentError(f"{arm.name}: these robots have six turning joints")
     nominal, real = arm.replace(np.zeros((_UR_JOINTS, 6))).dh(), arm.dh()

@@ -12,6 +12,7 @@ from pkmcal import screw
 from pkmcal.arguments import instance
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray
+from pkmcal.controllers.loss import require_plain
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.robot import Robot
 
@@ -50,7 +51,7 @@ def require_arm(arm: object, format: str) -> SerialArm:
     Raises
     ------
     ArgumentError
-        A parallel machine: it has loops.
+        A parallel machine: it has loops. An arm whose joints have laws.
     """
     if isinstance(arm, Robot):
         raise ArgumentError(
@@ -59,6 +60,7 @@ def require_arm(arm: object, format: str) -> SerialArm:
         )
     instance("arm", arm, SerialArm)
     assert isinstance(arm, SerialArm)
+    require_plain(arm, format)
     return arm
 
 

@@ -17,7 +17,8 @@ from pkmcal.controllers.c_source import Number
 from pkmcal.controllers.loss import Loss, sag
 from pkmcal.geometry.carried import CARRIED
 from pkmcal.geometry.elastic import COMPLIANCE, PER_LENGTH
-from pkmcal.kinematics.loaded import MOST_STEPS, LoadedMachine
+from pkmcal.kinematics.loaded import LoadedMachine
+from pkmcal.kinematics.resting import MOST_STEPS
 from pkmcal.kinematics.robot import Robot
 from pkmcal.screw import from_pose
 

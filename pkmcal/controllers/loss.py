@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
+from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray, rms
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.robot import Robot
@@ -75,6 +76,34 @@ def sag(robot: Robot) -> Loss:
         float(size.max()),
         "by what yields under the stated load, over half of its workspace",
     )
+
+
+def laws(arm: SerialArm) -> Loss:
+    """How far an arm is from the one whose joints stand where they are commanded."""
+    limits = arm.limits()
+    turning = np.array([unit == "rad" for unit in arm.actuator_units])
+    most = np.where(turning, np.pi, arm.length)
+    low = np.where(np.isfinite(limits[:, 0]), limits[:, 0], -most)
+    high = np.where(np.isfinite(limits[:, 1]), limits[:, 1], most)
+    theta = low + (high - low) * np.random.default_rng(0).random((_SAGS, arm.n_joints))
+    off = (arm.forward(theta) - arm.rigid.forward(theta))[:, :3, 3]
+    size = np.linalg.norm(off, axis=1)
+    return Loss(rms(size), float(size.max()), "by what its joints add to their commands")
+
+
+def require_plain(arm: SerialArm, format: str) -> None:
+    """Refuse an arm whose joints have laws.
+
+    Raises
+    ------
+    ValueError
+        It says by how much the arm would be off.
+    """
+    if arm.laws is not None and arm is not arm.rigid:
+        raise ArgumentError(
+            f"robot: {arm.name}: {format} does not hold what joints add to their commands;"
+            f" arm.rigid, without it, is {laws(arm)}"
+        )
 
 
 def fitted(

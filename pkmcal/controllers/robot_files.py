@@ -17,6 +17,13 @@ _PROBE_REMARK = """\
 """
 
 
+_UNCERTAIN = """\
+# How wrong numbers may be that are not free, one standard deviation: they are fitted within that.
+# [uncertainty]
+# "gain*" = 1e-3
+"""
+
+
 @dataclass(frozen=True)
 class About:
     """What a robot file says beside the machine.
@@ -72,7 +79,7 @@ def text_of(
         blocks.append(_PROBE_REMARK + "[probe]\n" + lines(probe_table(about.probe)))
     if parameters:
         blocks.append("[parameters]\n" + lines(parameters))
-    blocks.append(remark + "[calibration]\n" + lines({"free": free}))
+    blocks.append(remark + "[calibration]\n" + lines({"free": free}) + _UNCERTAIN)
     blocks += ["[[limb]]\n" + lines(limb) for limb in limbs]
     return "\n".join(block for block in blocks if block)
 

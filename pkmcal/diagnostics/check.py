@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any, Generic, Literal, TypeVar
 
 from pkmcal.estimation.loss import LIMITS
+from pkmcal.exceptions import ArgumentError
 from pkmcal.fitted.solution import Solution
 
 F = TypeVar("F")
@@ -23,7 +24,8 @@ _OPTIONS = {  # what the command line says otherwise than `identify`; None: it h
     ("effects", None): "--expansion",
     ("bounds", None): None,
 }
-_SEVERAL = ("drop", "fix", "loss", "per_session", "unknown")  # more beside what they have
+# arguments that take more beside what they have
+_SEVERAL = ("drop", "effects", "fix", "loss", "per_session", "unknown")
 
 
 @dataclass(frozen=True)
@@ -53,7 +55,15 @@ class Remedy:
     value: Any = None
 
     def applied(self, arguments: Mapping[str, Any]) -> dict[str, Any]:
-        """Arguments of `identify` with this one, beside what it had where it takes several."""
+        """Arguments of `identify` with this one, beside what it had where it takes several.
+
+        Raises
+        ------
+        ValueError
+            A remedy of which only the user knows the value.
+        """
+        if self.value is None:
+            raise ArgumentError(f"{self.argument}: the remedy states no value; state it yourself")
         before = arguments.get(self.argument)
         value = self.value
         if self.argument in _SEVERAL and before is not None:
@@ -70,6 +80,8 @@ class Remedy:
     def option(self) -> str | None:
         """The option of ``pkmcal calibrate``; None where it has none."""
         several = isinstance(self.value, tuple)
+        if several and all(hasattr(each, "option") for each in self.value):  # effects
+            return f"--{self.argument} {','.join(each.option for each in self.value)}"
         if not several and (self.argument, self.value) in _OPTIONS:
             return _OPTIONS[self.argument, self.value]
         name = f"--{self.argument.replace('_', '-')}"

@@ -2,11 +2,29 @@
 
 from __future__ import annotations
 
-from pkmcal.diagnostics import course, gain, held_out, machine, noise, priors, rows, search, units
+from pkmcal.diagnostics import (
+    causes,
+    course,
+    families,
+    gain,
+    held_out,
+    loads,
+    machine,
+    noise,
+    priors,
+    regions,
+    rounded,
+    rows,
+    sag,
+    search,
+    units,
+    waves,
+)
 from pkmcal.diagnostics.diagnosis import verified
 
 CHECKS = verified((
-    *held_out.CHECKS, *units.CHECKS, *machine.CHECKS, *search.CHECKS, *rows.CHECKS, *noise.CHECKS,
-    *priors.CHECKS, *course.CHECKS, *gain.CHECKS,
+    *held_out.CHECKS, *units.CHECKS, *families.CHECKS, *machine.CHECKS, *loads.CHECKS,
+    *search.CHECKS, *rows.CHECKS, *rounded.CHECKS, *noise.CHECKS, *priors.CHECKS, *course.CHECKS,
+    *causes.CHECKS, *regions.CHECKS, *gain.CHECKS, *sag.CHECKS, *waves.CHECKS,
 ))  # fmt: skip
 AT_ONCE = tuple(check for check in CHECKS if check.at_once)

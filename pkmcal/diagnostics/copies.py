@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.estimation.equations import Equations
+from pkmcal.estimation.pose_table import CHANCE
 from pkmcal.measurements import repeats
 
-_CHANCE = 3  # rows of a set that may equal those of another one by coarse digits alone
 _LISTED = 5  # rows that a sentence names
 
 
@@ -48,13 +48,11 @@ class Copied:
 
 
 def copies(equations: Equations) -> Iterator[Copied]:
-    """Find them; readings of actuators alone may well occur twice."""
+    """Find them; of readings of actuators alone, which may well occur twice, whole sets."""
     earlier, start = list[tuple[str, int, set[bytes]]](), 0
     for measured, pose in zip(equations.table.sets, equations.table.pose_of, strict=True):
         rows = equations.table.rows[start : start + len(measured)]
         start += len(measured)
-        if not measured.components:
-            continue
         table = np.column_stack([
             measured.actuators,
             np.empty((len(measured), 0)) if measured.other is None else measured.other,
@@ -63,10 +61,10 @@ def copies(equations: Equations) -> Iterator[Copied]:
         ])  # fmt: skip
         keys = {row.tobytes() for row in table} if len(equations.table.sets) > 1 else set()
         for kind, first, others in earlier:
-            if kind == measured.kind and len(keys) > _CHANCE and keys <= others:
+            if kind == measured.kind and len(keys) > CHANCE and keys <= others:
                 yield Copied(tuple(rows.tolist()), (first,), whole=True)
         earlier.append((measured.kind, int(rows[0]), keys))
-        if len(np.unique(pose)) == len(pose):
+        if not measured.components or len(np.unique(pose)) == len(pose):
             continue
         _, twin, inverse = np.unique(table, axis=0, return_index=True, return_inverse=True)
         twins = twin[inverse.reshape(-1)]

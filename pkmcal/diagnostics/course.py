@@ -7,11 +7,13 @@ import numpy as np
 from pkmcal.diagnostics.check import Check, Level, Remedy, at_most_one
 from pkmcal.diagnostics.displaced import DisplacedTarget, displaced_target
 from pkmcal.diagnostics.drift import Drift, drift
+from pkmcal.diagnostics.late import late
 from pkmcal.diagnostics.measuring_order import MeasuringOrder, measuring_order
+from pkmcal.diagnostics.two_machines import Apart, apart
 from pkmcal.fitted.solution import Solution
 
 
-def _level(found: Solution, seen: Drift | MeasuringOrder | DisplacedTarget) -> Level | None:
+def _level(found: Solution, seen: Drift | MeasuringOrder | DisplacedTarget | Apart) -> Level | None:
     return "doubt" if seen.large else "remark" if seen.found else None
 
 
@@ -34,6 +36,19 @@ CHECKS = (
         name="measuring-order", about="residuals follow the order of measuring",
         unless=("grave", "drift"), levels=("doubt", "remark"),
         run=lambda found: at_most_one(measuring_order(found.fit, found.outliers)), level_of=_level,
+        say=lambda found, seen: str(seen),
+    ),
+    Check(
+        name="late-readings", about="residuals follow the way from the pose before, or to the next",
+        unless=("grave",), run=lambda found: at_most_one(late(found)),
+        level_of=lambda found, seen: "doubt" if seen.found else None,
+        say=lambda found, seen: str(seen),
+    ),
+    Check(
+        name="two-machines", about="sets, sessions, halves or every second row want other numbers",
+        unless=("grave", "copies", "displaced-target"), levels=("doubt", "remark"),
+        run=lambda found: at_most_one(apart(found)),
+        level_of=lambda found, seen: _level(found, seen) if seen.found else None,
         say=lambda found, seen: str(seen),
     ),
     Check(

@@ -6,8 +6,10 @@ from collections.abc import Iterable, Iterator, MutableMapping, Sequence
 from graphlib import TopologicalSorter
 from typing import Any, get_args
 
+from pkmcal.arguments import instance, kind
 from pkmcal.diagnostics.check import Check, Level, Said
 from pkmcal.display import printable
+from pkmcal.exceptions import ArgumentTypeError
 from pkmcal.fitted.solution import Solution
 
 _LEVELS: tuple[Level, ...] = get_args(Level)
@@ -79,7 +81,13 @@ def verified(checks: Sequence[Check[Any]]) -> tuple[Check[Any], ...]:
         A name that two checks have; an `unless` that names no check and no level; checks that wait
         for each other; one that is made at once and waits for one that is not; several levels, and
         nothing that says which.
+    TypeError
+        No checks, or one alone.
     """
+    if isinstance(checks, Check) or not isinstance(checks, Iterable):
+        one = "the check alone" if isinstance(checks, Check) else kind(checks)
+        raise ArgumentTypeError(f"checks must be several, (*pkmcal.CHECKS, yours); found {one}")
+    checks = tuple(instance("checks: each", check, Check) for check in checks)
     names = [check.name for check in checks]
     graph: dict[str, set[str]] = {}
     for check in checks:

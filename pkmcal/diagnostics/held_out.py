@@ -9,17 +9,22 @@ from pkmcal.diagnostics.check import Check, Level, Remedy, at_most_one
 from pkmcal.diagnostics.moved import Moved, moved
 from pkmcal.display import chance_text, decimals, displayed, fixed
 from pkmcal.estimation.estimator import FEW, LEAST_FREEDOM
+from pkmcal.fitted.held_points import HeldFamily
 from pkmcal.fitted.row_names import row_names
 from pkmcal.fitted.solution import Solution
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.statistics.holdout_test import RATIO
 
 
-def _contradiction(found: Solution, chance: float) -> str:
-    return (
-        f"the held-out points contradict the fit: {found.holdout_rms:.3g} mm rms where"
-        f" {found.holdout_expected:.3g} mm is expected ({chance_text(chance)})"
-    )
+def _contradiction(found: Solution, several: tuple[HeldFamily, ...]) -> str:
+    alone = len(found.holdout_families) == 1
+    what = "points" if alone else " and ".join(each.family.noun for each in several)
+    parts = []
+    for each in several:
+        off, unit = displayed(each.rms, each.family.unit)
+        expected, _ = displayed(each.expected, each.family.unit)
+        parts.append(f"{off:.3g} {unit} rms where {expected:.3g} {unit} is expected")
+    chance = min(each.test.chance for each in several if each.test is not None)
+    return f"the held-out {what} contradict the fit: {' and '.join(parts)} ({chance_text(chance)})"
 
 
 def _without_outliers(found: Solution) -> float:
@@ -27,14 +32,17 @@ def _without_outliers(found: Solution) -> float:
 
 
 def _level_of_few(found: Solution, rows: tuple[int, ...]) -> Level:
-    return "doubt" if _without_outliers(found) > RATIO * found.holdout_expected else "remark"
+    return "remark" if all(each.agrees_otherwise for each in found.holdout_families) else "doubt"
 
 
 def _few_off(found: Solution, rows: tuple[int, ...]) -> str:
     them, are = ("them", "s are") if len(rows) > 1 else ("it", " is")
+    rest = _without_outliers(found)
+    without = (
+        f"without {them} the rms is {rest:.3g} mm" if np.isfinite(rest) else "no other is left"
+    )
     return (
-        f"{len(rows)} held-out point{are} off: {row_names(found.holdout_data, rows)}; without"
-        f" {them} the rms is {_without_outliers(found):.3g} mm,"
+        f"{len(rows)} held-out point{are} off: {row_names(found.holdout_data, rows)}; {without},"
         f" {found.holdout_expected:.3g} mm is expected"
     )
 
@@ -101,7 +109,7 @@ CHECKS = (
     Check(
         name="holdout-contradicts",
         about="held-out points are further off than noise and covariance explain",
-        run=lambda found: at_most_one(found.holdout_chance if found.holdout_contradicts else None),
+        run=lambda found: at_most_one(found.holdout_contradicting or None),
         say=_contradiction,
     ),
     Check(

@@ -75,6 +75,7 @@ def law_tests(
         said.
     """
     found = []
+    reported = uncertainty.reported[table.columns]
     for names in _groups(geometry, table.free):
         columns = [table.free.index(name) for name in names]
         known = prior[columns].any()
@@ -92,7 +93,7 @@ def law_tests(
         freedom = float(table.parameter_dof[columns].min())
         count, spent = float(len(columns)), 0.0
         if table.covariance_rule == "cluster":
-            freedom = uncertainty.covariance.sandwich.joint_freedom(uncertainty.reported[columns])
+            freedom = uncertainty.covariance.sandwich.joint_freedom(reported[columns])
             spent = count - 1.0
         rest = freedom - spent
         if rest > 0.0:

@@ -15,7 +15,7 @@ from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.identifiability import listed
 from pkmcal.estimation.mode_slips import in_other_modes
 from pkmcal.fitted.solution import Solution
-from pkmcal.geometry.load import is_of_load
+from pkmcal.geometry.elastic import is_kinematic
 from pkmcal.kinematics.robot import Robot
 
 FAR = 0.25  # share of the machine's size by which errors of manufacture do not move a parameter
@@ -28,12 +28,12 @@ _NO_LENGTH = {"touch", "orientation", "tilt", "angle", "closure"}  # kinds that 
 def far_numbers(found: Solution) -> dict[str, float]:
     """Numbers of the geometry that moved further than errors of manufacture explain, and how far.
 
-    In mm at the machine; numbers of a load may be anything.
+    In mm at the machine; numbers of a load, and of what yields, may be anything.
     """
     chosen = found.fit.parameters
     change = found.fit.estimate.evaluation.theta - found.fit.start.theta
     moved = np.abs(change / chosen.scale)[chosen.geometry]
-    moved[[is_of_load(name) for name in chosen.names[chosen.geometry]]] = 0.0
+    moved[[not is_kinematic(name) for name in chosen.names[chosen.geometry]]] = 0.0
     far = np.flatnonzero(moved > FAR * chosen.robot.length)
     return {chosen.names[i]: float(moved[i]) for i in far}
 

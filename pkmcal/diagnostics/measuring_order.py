@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -48,6 +48,8 @@ class MeasuringOrder:
         How many poses there were one after the other.
     series : str
         Which file or session, where there are several.
+    by_place : bool
+        Whether where the machine was explains as much: it was measured place after place.
     """
 
     components: tuple[str, ...]
@@ -59,6 +61,7 @@ class MeasuringOrder:
     jump: str
     visits: int
     series: str
+    by_place: bool = False
 
     @property
     def found(self) -> bool:
@@ -68,7 +71,7 @@ class MeasuringOrder:
     @property
     def large(self) -> bool:
         """Whether that is most of what they are."""
-        return self.found and self.share > _MOST
+        return self.found and self.share > _MOST and not self.by_place
 
     def _counted(self) -> list[int]:
         """Components that are lengths, or all where none is."""
@@ -83,6 +86,12 @@ class MeasuringOrder:
         along = "" if len(counted) == 1 else f", most of it {most}"
         where = f" from {self.jump} on" if self.jump else " in the course of measuring"
         of = f" of {self.series}" if self.series else ""
+        if self.by_place:
+            return (
+                f"residuals{of} follow where the machine was ({chance_text(self.chance)}), up to"
+                f" {value:.3g} {unit}{along}, and it was measured place after place: the model"
+                " misses something there, or all drifted; poses in another order would tell"
+            )
         return (
             f"residuals{of} are as if readings had shifted by {value:.3g} {unit}{where}{along}"
             f" ({chance_text(self.chance)}): machine or instrument moved meanwhile, or the model is"
@@ -112,6 +121,7 @@ def measuring_order(fit: Fit, odd: Collection[int]) -> MeasuringOrder | None:
     if not known:
         return None
     series, first, course = min(known, key=lambda each: each[2].chance)
+    by_place = course.chance * len(known) < CHANCE and _place_explains(fit, visits, series)
     names, units = zip(*_components(fit).items(), strict=True)
     read = np.flatnonzero(course.scatter)
     at = [] if course.jump is None else [visits.row[first + course.jump]]
@@ -125,7 +135,20 @@ def measuring_order(fit: Fit, odd: Collection[int]) -> MeasuringOrder | None:
         jump=row_names(fit.equations.prediction.datasets, at),
         visits=len(course.values),
         series=visits.names[series] if len(visits.names) > 1 else "",
+        by_place=by_place,
     )
+
+
+def _place_explains(fit: Fit, visits: _Visits, series: int) -> bool:
+    """Whether nothing is left of the course beside a quadratic function of the place."""
+    place = fit.end.pose[np.concatenate(fit.equations.table.pose_of)[visits.place], :3]
+    place = (place - place.mean(axis=0)) / max(float(np.ptp(place, axis=0).max()), 1e-300)
+    products = [place[:, i] * place[:, j] for i in range(3) for j in range(i, 3)]
+    functions = np.column_stack([place, *products])[visits.visit]
+    added = visits.by_component[:, :, None] * functions[:, None]
+    design = np.hstack([visits.design, added.reshape(len(added), -1)])
+    tested = _tested(replace(visits, design=design), series)
+    return tested is not None and tested[2].chance > CHANCE
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +157,8 @@ class _Visits:
 
     names: tuple[str, ...]  # of the series
     series: IntArray  # (V,)
-    row: IntArray  # the first of each
+    row: IntArray  # the first of each, by its number
+    place: IntArray  # it, by its place among the fitted rows
     visit: IntArray  # (E,) of each equation, components of a visit averaged
     design: FloatArray
     residual: FloatArray
@@ -169,6 +193,7 @@ def _visits(fit: Fit, odd: Collection[int]) -> _Visits:
         names=names,
         series=series[first],
         row=equations.table.rows[first],
+        place=first,
         visit=visit[labels.row][mine][where],
         design=averaged(sure.fit.design),
         residual=averaged(sure.fit.residual[:, None])[:, 0],

@@ -148,7 +148,7 @@ def _later_session(
     whole = later.equations(sure.equations)
     commanded = whole.with_exact_actuators()
     evaluation = in_their_modes(commanded, commanded.at(end.theta, near=end))
-    if not sure.equations.closures.unknowns:
+    if not sure.equations.machines.unknowns:
         return commanded, evaluation, noise_factors(later, commanded, sure)
     noise = noise_factors(later, whole, sure)
     whole, start = whole.begin(evaluation)

@@ -109,7 +109,7 @@ def _unestimated(found: Solution) -> tuple[tuple[str, ...], ...]:
     """Groups of equations the noise of which is neither stated nor shown."""
     sure, equations = found.fit.uncertainty, found.fit.equations
     names = [f"of measurements {i + 1}" for i in range(len(equations.table.sets))]
-    names += ["of the load cells"] if equations.closures.cells else []
+    names += ["of the load cells"] if equations.machines.cells else []
     if not (sure.mixed and sure.unknown.any()):
         return ()
     groups = zip([*names, "of the actuators"], sure.unknown, strict=True)
@@ -117,7 +117,7 @@ def _unestimated(found: Solution) -> tuple[tuple[str, ...], ...]:
 
 
 def _unestimated_text(found: Solution, groups: tuple[str, ...]) -> str:
-    cells = found.fit.equations.closures.cells
+    cells = found.fit.equations.machines.cells
     sigmas = "sigma, actuator_sigma and tension_sigma" if cells else "sigma and actuator_sigma"
     return f"too little is left over to estimate the noise {' and '.join(groups)}: state {sigmas}"
 

@@ -8,13 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from pkmcal.diagnostics.units import (
-    GROSS,
-    MISFIT_RATIO,
-    exchanges,
-    likely_unit_errors,
-    other_readings,
-)
+from pkmcal.diagnostics.families import GROSS
+from pkmcal.diagnostics.other_readings import exchanges, other_readings
+from pkmcal.diagnostics.units import MISFIT_RATIO, likely_unit_errors
 from pkmcal.display import printable
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.evaluation import Evaluation
@@ -103,7 +99,9 @@ def _median(data: FitData, parameters: Parameters) -> float:
     except ValueError:
         return float("inf")
     read = np.isfinite(data.measured.values.reshape(start.residuals[0].shape)).any(axis=1)
-    off = np.linalg.norm(of_read(data.measured, start.residuals[0])[read, :3], axis=1)
+    whole = of_read(data.measured, start.residuals[0])
+    length = parameters.robot.length
+    off = data.measured.instrument.distance_per_point(whole, data.measured, length)[read]
     return float(np.median(np.where(np.isfinite(off), off, np.inf))) if read.any() else np.inf
 
 

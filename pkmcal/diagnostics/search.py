@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from pkmcal.diagnostics.check import Check, Level, Remedy, at_most_one
 from pkmcal.diagnostics.linearity import Weak, beyond_linear
+from pkmcal.estimation.held_coefficients import coefficients
 from pkmcal.estimation.identifiability import listed
 from pkmcal.fitted.solution import Solution
 
@@ -18,7 +21,8 @@ def _too_few(found: Solution) -> tuple[str, ...]:
     """What there is too little of: poses, equations, or freedom; the sentence on it."""
     equations = found.fit.uncertainty.equations
     n, count = len(equations.parameters), int(equations.blocks.components.sum())
-    if len(equations.table.actuators) == 1 and len(equations.table.rows) > 1:
+    read = equations.table.actuators
+    if (read == read[0]).all() and len(equations.table.rows) > 1:
         return ("all rows have the same actuators: measure different poses",)
     if count < n and not len(found.fit.estimate.prior):
         return (
@@ -58,6 +62,16 @@ def _level_of_weak(found: Solution, weak: Weak) -> Level:
     return "remark" if weak.assembled else "doubt"
 
 
+def _undetermined(found: Solution) -> tuple[str, ...]:
+    """Coefficients of effects, by name, of which the measurements say nothing."""
+    of_effects = {*coefficients(found.fit.equations.prediction.datasets)}
+    return tuple(
+        name
+        for name, sigma in zip(found.free, found.stderr.tolist(), strict=True)
+        if name.partition("@")[0] in of_effects and not np.isfinite(sigma)
+    )
+
+
 CHECKS = (
     Check(
         name="nothing-determined", about="the measurements determine no number of the machine",
@@ -89,6 +103,15 @@ CHECKS = (
         about="combinations of numbers are so weak that the search kept what they had",
         at_once=True, run=lambda found: at_most_one(_kept(found) or None), say=_kept_text,
         remedies=lambda found, _: (Remedy("prior"),),
+    ),
+    Check(
+        name="undetermined-effect", about="coefficients of effects that are not determined",
+        unless=("grave",), run=lambda found: at_most_one(_undetermined(found) or None),
+        say=lambda found, names: (
+            f"{listed(names)} {'are' if len(names) > 1 else 'is'} not determined by these"
+            " measurements: measure what the effect moves, or hold it"
+        ),
+        remedies=lambda found, names: (Remedy("fix", names),),
     ),
     Check(
         name="beyond-linear",

@@ -2,7 +2,8 @@
 
 To first order: it turns and shifts the platform by a twist, which readings then follow. Its
 coefficients are given, or estimated with the geometry. An effect that is not in the package is an
-object with the members of `Effect`; `identify(effects=[...])` takes it.
+object with the members of `Effect`; `identify(effects=[...])` takes it. What the kinematics of a
+machine take into account is an effect, too: a `Changed` machine, with numbers that are free.
 """
 
 from __future__ import annotations
@@ -25,11 +26,14 @@ class Moved(NamedTuple):
         Its derivative by each argument of the effect that may be estimated.
     growth : ndarray (N,) or None
         Relative growth of places on the platform.
+    growth_by : mapping of str to ndarray (N, w)
+        Its derivative by each argument that may be estimated.
     """
 
     twist: FloatArray
     by: Mapping[str, FloatArray] = {}
     growth: FloatArray | None = None
+    growth_by: Mapping[str, FloatArray] = {}
 
 
 class EffectOfRows(Protocol):
@@ -64,10 +68,29 @@ class Effect(Protocol):
         """Its coefficients: arguments whose names no reading and no other effect has."""
 
 
+class Changed(NamedTuple):
+    """An effect that is numbers of the machine itself, which its kinematics take into account.
+
+    Attributes
+    ----------
+    name : str
+        As messages say it.
+    machine : Calibratable
+        The machine with these numbers.
+    free : mapping of str to float
+        Which of its numbers the effect frees, and the standard deviation of what is known of each,
+        about its present value; inf where nothing is.
+    """
+
+    name: str
+    machine: Any
+    free: Mapping[str, float]
+
+
 class StatedEffect(Protocol):
     """An effect that is stated of any machine, and asks the machine what it is there."""
 
-    def of_machine(self, machine: Any) -> Effect:
+    def of_machine(self, machine: Any) -> Effect | Changed:
         """The effect on this machine."""
 
 

@@ -72,6 +72,8 @@ class Expansion:
         numbers = machine.geometry.numbers
         coefficient, column = np.zeros(len(numbers)), np.zeros(len(numbers), dtype=np.intp)
         for i, number in enumerate(numbers):
+            if number.limb < 0:  # of loads, and of what yields
+                continue
             part = number.slot.partition(".")[0]
             part = "base" if part.startswith("over") else part
             if part in _PARTS:

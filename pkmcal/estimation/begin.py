@@ -11,6 +11,7 @@ from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.loss import LossName
 from pkmcal.estimation.mode_slips import start_in_modes
 from pkmcal.estimation.parameters import Parameters
+from pkmcal.estimation.pose_minima import in_least_minima
 from pkmcal.exceptions import ArgumentError
 
 
@@ -19,7 +20,12 @@ def begun(
 ) -> tuple[Equations, Equations, Evaluation]:
     """The equations, those with exact actuators, and where these start."""
     equations = Equations.of(datasets, chosen, unread)
-    start = start_in_modes(equations.with_exact_actuators())
+    exact = equations.with_exact_actuators()
+    start = start_in_modes(exact)
+    _, own = equations.begin(start)
+    better = in_least_minima(equations.with_parameters(start.parameters), own)
+    if better is not own:
+        start = exact.start(states=better.onward)
     equations = equations.with_parameters(start.parameters)
     return equations, equations.with_exact_actuators(), start
 

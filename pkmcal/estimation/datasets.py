@@ -13,6 +13,7 @@ from pkmcal.effects.effect import Effect
 from pkmcal.estimation.closures import has_equations
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.parameters import KNOWN, Known
+from pkmcal.estimation.runs import runs_apart
 from pkmcal.estimation.sessions import in_sessions, set_names
 from pkmcal.estimation.starts import with_starts
 from pkmcal.estimation.tensioned_poses import unknown_tensions
@@ -39,6 +40,7 @@ def as_fit_data(
         _check(robot, measured, "measurements")
     if not sets:
         raise ArgumentError("measurements: none given")
+    sets = runs_apart(sets)
     if sessions:
         sets = in_sessions(sets)
     datasets, first = [], 0
@@ -109,6 +111,7 @@ def as_fitted(
     of_cells = datasets[i].measured.tension_sigma
     if holdout.tension_sigma is None and of_cells is not None and holdout.tension is not None:
         holdout = replace(holdout, tension_sigma=np.sqrt(np.mean(of_cells**2, axis=0)))
+    (holdout,) = runs_apart([holdout], [data.measured for data in datasets])
     data = replace(datasets[i], measured=holdout, rows=np.arange(len(holdout)))
     return with_starts(robot, [data])[0], i
 

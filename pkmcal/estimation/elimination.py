@@ -24,7 +24,7 @@ import numpy as np
 from pkmcal.arrays import BoolArray, FloatArray, IntArray, lots
 from pkmcal.core.elimination import Fit, PoseEquations
 from pkmcal.estimation.row_states import RowStates
-from pkmcal.estimation.session_machines import Machines, SessionClosures
+from pkmcal.estimation.session_machines import Machines
 
 _STEPS = 50  # of finding the best poses
 _STRAIGHT = 12  # of these, as if equations were straight; then as they bend
@@ -155,7 +155,7 @@ class Elimination:
         return squares, freedom, information
 
     def best(
-        self, closures: SessionClosures, machines: Machines, states: RowStates, system: Equate
+        self, machines: Machines, states: RowStates, system: Equate
     ) -> tuple[RowStates, System]:
         """The states of least squares, each pose by itself.
 
@@ -175,14 +175,14 @@ class Elimination:
             if k >= _STRAIGHT:
 
                 def pulled(by: FloatArray, at: RowStates = states) -> FloatArray:
-                    return self._all.normals(*system(closures.moved(machines, at, by)))[1]
+                    return self._all.normals(*system(machines.moved(at, by)))[1]
 
                 damping[:] *= k > _STRAIGHT
                 fit = self._newton(fit, there, damping, moving, pulled)
             moving = fit.gain > 0.0
             if not moving.any():
                 break
-            trial = closures.moved(machines, states, fit.step)
+            trial = machines.moved(states, fit.step)
             beyond = system(trial)
             after = self._fit(beyond, damping)
             worse = moving & ~(after.cost < fit.cost)

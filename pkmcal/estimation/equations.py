@@ -26,14 +26,8 @@ from pkmcal.estimation.pose_table import PoseTable
 from pkmcal.estimation.prediction import Prediction
 from pkmcal.estimation.row_blocks import PoseBlocks, RowBlocks, pose_blocks, row_blocks
 from pkmcal.estimation.row_states import RowStates
-from pkmcal.estimation.session_machines import (
-    Machines,
-    SessionClosures,
-    closures_of_sessions,
-    exact_closures,
-)
+from pkmcal.estimation.session_machines import Machines, machines_of
 from pkmcal.estimation.whitening import Whitening
-from pkmcal.kinematics.drive_state import DriveState
 from pkmcal.result import failed_rows
 
 _TOGETHER = 16384  # rows whose readings are kept with their derivatives
@@ -57,12 +51,10 @@ class Equations:
         What the instruments should read.
     whitening : Whitening
         The noise of what they read.
-    closures : SessionClosures
-        What the closures say of the poses.
+    machines : Machines
+        The machines at their present numbers, and what their closures say of the poses.
     blocks : RowBlocks
         Which equations count together.
-    state : DriveState
-        From where the actuators came, and the tension of what they drive, (K, n) each.
     without_slack : ndarray (K, n)
         What the actuators would read if no cable were slack.
     """
@@ -70,9 +62,8 @@ class Equations:
     missing: int
     prediction: Prediction
     whitening: Whitening
-    closures: SessionClosures
+    machines: Machines
     blocks: RowBlocks
-    state: DriveState
     without_slack: FloatArray
 
     @classmethod
@@ -80,24 +71,23 @@ class Equations:
         """The equations of rows; rows with the same actuators are solved once."""
         prediction = Prediction.of(datasets, parameters)
         table, robot = prediction.table, parameters.robot
-        sigma, cells, own = table.actuator_sigma, table.cells, table.poses_of_machine
-        closures = closures_of_sessions(robot, own, table.actuators, sigma, cells)
+        machines = machines_of(robot, table)
         whitening = Whitening.of(table.sets, robot.length)
         unstated = np.array([
             m.sigma is None and bool(read.any())
             for m, read in zip(table.sets, whitening.read, strict=True)
         ])  # fmt: skip
         blocks = row_blocks(table, unstated, missing)
-        given = missing, prediction, whitening, closures, blocks, table.state, table.actuators
-        equations = cls(*given)
-        if not closures.unknowns:
+        equations = cls(missing, prediction, whitening, machines, blocks, table.actuators)
+        if not machines.unknowns:
             return equations
         prediction.refuse_free_poses()
-        of_cells = [cells is not None and cells.sigma is None] if closures.cells else []
-        groups = np.concatenate([unstated, of_cells, [sigma is None]]).astype(bool)
-        slack = np.zeros((len(table.actuators), closures.equations), dtype=bool)
+        cells = table.cells
+        of_cells = [cells is not None and cells.sigma is None] if machines.cells else []
+        groups = np.concatenate([unstated, of_cells, [table.actuator_sigma is None]]).astype(bool)
+        slack = np.zeros((len(table.actuators), machines.equations), dtype=bool)
         return replace(
-            equations, blocks=pose_blocks(table, closures, slack, groups, equations.size)
+            equations, blocks=pose_blocks(table, machines, slack, groups, equations.size)
         )
 
     @property
@@ -111,9 +101,9 @@ class Equations:
         return self.prediction.table
 
     @cached_property
-    def arcs(self) -> tuple[float, ...]:
-        """What takes the misfit of each set to mm: where angles alone were read, the length."""
-        return tuple(m.instrument.arc(m, self.parameters.robot.length) for m in self.table.sets)
+    def arcs(self) -> tuple[FloatArray, ...]:
+        """What takes the residuals of the components (k,) of each set to mm."""
+        return tuple(m.instrument.arcs(m, self.parameters.robot.length) for m in self.table.sets)
 
     @property
     def size(self) -> float:
@@ -144,18 +134,18 @@ class Equations:
         """What the poses' unknowns take of the equations; None where poses have none."""
         if not isinstance(self.blocks, PoseBlocks):
             return None
-        return PoseSystem(self.prediction, self.whitening, self.closures, self.blocks)
+        return PoseSystem(self.prediction, self.whitening, self.blocks)
 
     # other equations ------------------------------------------------------------------------------
 
     def with_exact_actuators(self) -> Equations:
         """The equations of poses that follow from the actuators as they read."""
-        if not self.closures.unknowns:
+        if not self.machines.unknowns:
             return self
         unstated = self.blocks.unstated[: len(self.table.sets)]
         return replace(
             self,
-            closures=exact_closures(self.table.poses_of_machine, self.without_slack),
+            machines=self.machines.with_exact_actuators(self.without_slack),
             blocks=row_blocks(self.table, unstated, self.missing),
         )
 
@@ -169,7 +159,8 @@ class Equations:
         """The equations under tensions (K, n) of what the actuators drive; None: as they are."""
         if tension is None:
             return self
-        return replace(self, state=self.state._replace(tension=tension))
+        state = self.machines.state._replace(tension=tension)
+        return replace(self, machines=replace(self.machines, state=state))
 
     def without_closures(
         self, cells: Sequence[tuple[int, int]], evaluation: Evaluation
@@ -184,8 +175,8 @@ class Equations:
         slack[tuple(np.array(cells, dtype=np.intp).reshape(-1, 2).T)] = True
         without_slack = self.table.actuators.copy()
         for pose, cell in zip(*np.nonzero(slack), strict=True):
-            without_slack[pose, self.closures.actuators[cell]] += needed[pose, cell]
-        blocks = pose_blocks(self.table, self.closures, slack, self.blocks.unstated, self.size)
+            without_slack[pose, self.machines.actuators[cell]] += needed[pose, cell]
+        blocks = pose_blocks(self.table, self.machines, slack, self.blocks.unstated, self.size)
         return replace(self, blocks=blocks, without_slack=without_slack)
 
     def reweighted(self, deviations: Sequence[FloatArray]) -> Equations:
@@ -252,7 +243,7 @@ class Equations:
     def begin(self, start: Evaluation) -> tuple[Equations, Evaluation]:
         """The equations by the parameters of a start with exact actuators, evaluated there."""
         equations = self.with_parameters(start.parameters)
-        if not self.closures.unknowns:
+        if not self.machines.unknowns:
             return equations, start
         # closures that contradict each other may still have a best pose
         lost = np.flatnonzero(start.status)
@@ -271,7 +262,7 @@ class Equations:
         p = self.parameters
         columns = self.table.machine_columns
         robots = [p.robot.with_values(p.values_at(theta, own)) for own in columns]
-        return Machines(tuple(robots), self.table.poses_of_machine, self.state)
+        return replace(self.machines, robots=tuple(robots))
 
     def _begun(self, near: Near) -> RowStates:
         if near is None:
@@ -283,15 +274,15 @@ class Equations:
         states = self._begun(near)
         known = near.cache.get("following") if isinstance(near, Evaluation) else None
         if known is None or known[0] is not self.system or not isinstance(near, Evaluation):
-            return self.closures.settled(machines, states)
+            return machines.settled(states)
         _, following = known
         step = (following.reshape(-1, len(theta)) @ (theta - near.theta)).reshape(
             following.shape[:2]
         )
         step[~np.isfinite(step).all(axis=1)] = 0.0
-        ahead = self.closures.moved(machines, states, step)
+        ahead = machines.moved(states, step)
         if ahead.status.any():
-            ahead = ahead.chosen(ahead.status == 0, self.closures.settled(machines, states))
+            ahead = ahead.chosen(ahead.status == 0, machines.settled(states))
         return ahead
 
     # at an evaluation -----------------------------------------------------------------------------
@@ -316,7 +307,7 @@ class Equations:
             yield slice(0, len(self.blocks.components)), slice(0, len(found)), found
             return
         blocks = equations = slice(0, 0)
-        for batch, parts in self.prediction.derivatives(evaluation, self.closures):
+        for batch, parts in self.prediction.derivatives(evaluation):
             white = [self.whitening.whiten_rows(part, i, rows, noise) for i, rows, part in parts]
             whole = white[0] if len(white) == 1 else np.concatenate(white)
             read = int(np.count_nonzero(self.table.count[batch]))
@@ -326,7 +317,7 @@ class Equations:
 
     def jacobian(self, evaluation: Evaluation) -> list[FloatArray]:
         """Derivative of the predicted values of each set to the parameters, (N, k, n)."""
-        return self.prediction.jacobian(evaluation, self.closures)
+        return self.prediction.jacobian(evaluation)
 
     def by_groups(
         self,

@@ -16,7 +16,7 @@ from pkmcal.estimation.identifiability import (
     decompose,
     directions,
 )
-from pkmcal.estimation.least_squares import Search, Trail
+from pkmcal.estimation.least_squares import Search, SingularError, Trail
 from pkmcal.estimation.loss import Loss, LossName
 from pkmcal.exceptions import ArgumentError
 from pkmcal.statistics import prior_test
@@ -61,7 +61,7 @@ class Estimator:
     @property
     def least_freedom(self) -> float:
         """Degrees of freedom from which the noise of a group is estimated."""
-        return LEAST_REDUNDANCY if self.equations.closures.unknowns else LEAST_FREEDOM
+        return LEAST_REDUNDANCY if self.equations.machines.unknowns else LEAST_FREEDOM
 
     def unknown_noise(self, estimate: Estimate) -> BoolArray:
         """Groups (G,) whose noise is neither stated nor can be estimated: too little is left.
@@ -79,7 +79,8 @@ class Estimator:
         The search begins at `near`, or else at the start.
         """
         size = self.start.robot.length
-        state = self._state(self._first_noise(), self._first_loss(), size)
+        noise, freedom = self._first_noise()
+        state = replace(self._state(noise, self._first_loss(), size), first_freedom=freedom)
         if not state.fitted.rank:
             names = ", ".join(self.equations.parameters.names)
             raise ArgumentError(f"they depend on none of {names}")
@@ -92,16 +93,21 @@ class Estimator:
             # rows that nothing contradicts pin what is not determined
             kept = state.fitted.unidentifiable
             pins = state.fitted.singular[0] * kept.T
-            u, trail = self.search.best(trail, u, state.noise, state.loss, pins)
-            u = u - kept @ (kept.T @ u)
-            trail = self.search.at(trail, u, state.noise)
-            estimate = self._estimate(trail, state)
-            fewer = None if trail.converged else self._fewer(estimate)
+            try:
+                u, trail = self.search.best(trail, u, state.noise, state.loss, pins)
+                u = u - kept @ (kept.T @ u)
+                trail = self.search.at(trail, u, state.noise)
+                estimate = self._estimate(trail, state)
+                fewer = None if trail.converged else self._fewer(state, self._revised(estimate))
+            except SingularError:
+                fewer = self._fewer(state, state)
+                if fewer is None:
+                    raise
             if fewer is not None:
                 state, u = fewer, np.zeros(len(self.scale))
                 trail = replace(trail, near=self.start)
                 continue
-            if self.equations.closures.unknowns and state.first_freedom is None:
+            if self.equations.machines.unknowns and state.first_freedom is None:
                 state = replace(state, first_freedom=estimate.freedom)
                 estimate = replace(estimate, state=state)
             revised = self._revised(estimate)
@@ -129,18 +135,22 @@ class Estimator:
         of_units = width[self.equations.blocks.family_of_block]
         return Loss(name, self.equations.blocks.components, of_units)
 
-    def _first_noise(self) -> FloatArray:
+    def _first_noise(self) -> tuple[FloatArray, FloatArray | None]:
         """1 mm where it is not stated; with a prior what the data alone show at the start.
 
         Noise and prior could else excuse each other: much of one leaves little of the other.
+        Where the groups' noise is then not equal, also the `IterationState.first_freedom`.
         """
         ones = np.ones(len(self.unstated))
         if not self._priors or self.loss != "linear":
-            return ones
+            return ones, None
         jacobian = self.search.jacobian(self.start, ones)
         residual = self.equations.residual(self.start, ones)
         alone = self._alone(self.start, ones, jacobian, residual)
-        return ones if alone is None else self._kept(ones * self._scored(alone)[0], ones)
+        if alone is None:
+            return ones, None
+        freedom = alone[1] if self.equations.machines.unknowns else None
+        return self._kept(ones * self._scored(alone)[0], ones), freedom
 
     def _alone(
         self,
@@ -229,10 +239,13 @@ class Estimator:
                 singular, basis = known.at_start[0]
                 return ((singular / factors[0], basis),) * 2
         factor = self._triangle(evaluation, noise, last)
-        data = decompose(factor)
         if not self._priors:
+            data = decompose(factor)
             return data, data
-        return data, decompose(factor, self.search.prior(evaluation.theta))
+        prior, chosen = self.search.prior(evaluation.theta), self.equations.parameters
+        # what is fixed but for an uncertainty is known to measurements without a prior, too
+        stated = [prior[chosen.prior_of_uncertain]] if len(chosen.spread) else []
+        return decompose(factor, *stated), decompose(factor, prior)
 
     def _triangle(
         self, evaluation: Evaluation, noise: FloatArray, last: Estimate | None
@@ -245,18 +258,18 @@ class Estimator:
                 return grown
         return self.search.triangle(evaluation, noise)
 
-    def _fewer(self, estimate: Estimate) -> IterationState | None:
+    def _fewer(self, state: IterationState, revised: IterationState) -> IterationState | None:
         """The state to begin again with after a search without an end; None where there is none.
 
-        It went along what is hardly determined, far from any machine: less of it is fitted.
+        It went along what is hardly determined, far from any machine or into a singular one: less
+        of it is fitted. `revised` has the noise that the search has shown.
         """
-        revised = self._revised(estimate)
-        worst, last = estimate.state.worst, replace(estimate, state=revised)
+        worst = state.worst
         while worst > _LEAST_WORST * self.start.robot.length:
             worst *= _LESS
-            state = self._state(revised.noise, estimate.state.loss, worst, last)
-            if 0 < state.fitted.rank < estimate.state.fitted.rank:
-                return state
+            fewer = self._state(revised.noise, state.loss, worst)
+            if 0 < fewer.fitted.rank < state.fitted.rank:
+                return replace(fewer, first_freedom=revised.first_freedom)
         return None
 
     def _revised(self, estimate: Estimate) -> IterationState:
@@ -331,7 +344,7 @@ class Estimator:
         factor = float(factors[0])
         if self.loss != "linear" or old.determined.rank != new.determined.rank:
             return None
-        alone = not (self._priors or self.equations.closures.unknowns)
+        alone = not (self._priors or self.equations.machines.unknowns)
         return factor if (factors == factor).all() and (factor == 1.0 or alone) else None
 
     def scaled_triangle(self, evaluation: Evaluation) -> FloatArray:
@@ -339,11 +352,11 @@ class Estimator:
 
         Where poses have unknowns it is that of what is left of all equations, whitened as stated.
         """
-        if self.equations.closures.unknowns:
+        if self.equations.machines.unknowns:
             return self.search.triangle(evaluation, np.ones(len(self.unstated)))
         arcs = [m.instrument.mm(m, self.start.robot.length) for m in self.equations.table.sets]
         factor = np.zeros((0, len(self.scale)))
-        for _, parts in self.equations.prediction.derivatives(evaluation, self.equations.closures):
+        for _, parts in self.equations.prediction.derivatives(evaluation):
             for i, rows, part in parts:
                 part *= arcs[i][:, None] * self.scale
                 factor = triangle(factor, self.equations.whitening.stacked(part, i, rows))

@@ -16,7 +16,8 @@ from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.hand_eye import of_frame_and_tool, of_tool
 from pkmcal.estimation.parameters import Parameters
 from pkmcal.estimation.prediction import Prediction
-from pkmcal.readings.alignment import PointPairs, of_heights, of_points, of_poses
+from pkmcal.measurements.measurements import Measurements
+from pkmcal.readings.alignment import Sighting
 
 Rows = dict[int, IntArray]  # of a frame, in each set
 
@@ -33,16 +34,16 @@ def aligned(
     evaluation : Evaluation
         Where the machine is with the present parameters.
     own : ndarray of bool (n,), optional
-        Which parameters may be changed; all by default.
+        Which parameters may be changed; by default all that are not known but for an uncertainty.
     """
     parameters, theta = prediction.parameters, evaluation.theta.copy()
-    free = np.ones(len(parameters), dtype=bool) if own is None else own.copy()
+    free = ~parameters.uncertain if own is None else own & ~parameters.uncertain
     frames, tools = prediction.frames, prediction.tools
     _with_known_frame(prediction, evaluation, theta, free)
     by_points = [
         first
         for first, rows in frames.items()
-        if any(prediction.table.sets[i].kind == "position" for i in rows)
+        if any(_gives_points(prediction.table.sets[i]) for i in rows)
     ]
     for first in dict.fromkeys([*by_points, *tools, *frames]):
         if not free[first]:
@@ -57,6 +58,11 @@ def aligned(
     return parameters, theta
 
 
+def _gives_points(measured: Measurements) -> bool:
+    """Whether x, y and z of points were read, without an orientation."""
+    return measured.instrument.is_place and measured.instrument.turning is None
+
+
 def _with_known_frame(
     prediction: Prediction, evaluation: Evaluation, theta: FloatArray, free: BoolArray
 ) -> None:
@@ -65,9 +71,7 @@ def _with_known_frame(
     At the medians, which a few rows that are solved in another assembly mode do not move.
     """
     framed = {i for rows in prediction.frames.values() for i in rows}
-    seen = [
-        i for i, m in enumerate(prediction.table.sets) if m.kind == "position" and i not in framed
-    ]
+    seen = [i for i, m in enumerate(prediction.table.sets) if _gives_points(m) and i not in framed]
     every = {i: np.arange(len(prediction.table.sets[i])) for i in seen}
     columns = {i: _free_targets(prediction, i, rows, free)[:, 0] for i, rows in every.items()}
     for first in np.unique(np.concatenate([np.empty(0, np.intp), *columns.values()])).tolist():
@@ -161,48 +165,24 @@ def _aligned(
     free: BoolArray,
 ) -> FloatArray:
     """The frame (6,) nearest to the readings; targets that are free are moved and then not free."""
-    kinds = {
-        kind: sets
-        for kind in ("position", "pose", "height", "orientation", "tilt")
-        if (sets := [i for i in rows if prediction.table.sets[i].kind == kind])
-    }
-    of_points_in = kinds.get("position", [])
-    if not of_points_in:
-        kind = next(iter(kinds))
-        values = np.concatenate([prediction.table.sets[i].values[rows[i]] for i in kinds[kind]])
-        if kind == "tilt":  # as level as the robot file says
-            return np.zeros(6)
-        if kind != "height":
-            seen = [
-                _seen(prediction, evaluation, i, rows[i], parameters, theta) for i in kinds[kind]
-            ]
-            whole = np.zeros((2, len(values), 6))
-            whole[:, :, 6 - values.shape[1] :] = values, np.concatenate(seen)
-            whole[0, :, np.isnan(whole[0]).all(axis=0)] = 0.0  # never read, as across a plane
-            read, predicted = whole[:, np.isfinite(whole[0]).all(axis=1)]
-            return of_poses(read, predicted) if len(read) else np.zeros(6)
-        parts = [_points(prediction, evaluation, i, rows[i], theta) for i in kinds[kind]]
-        return of_heights(values, np.concatenate([places for places, _ in parts]))
-    values = np.concatenate([prediction.table.sets[i].values[rows[i]] for i in of_points_in])
-    columns = np.concatenate([_free_targets(prediction, i, rows[i], free) for i in of_points_in])
-    parts = [_points(prediction, evaluation, i, rows[i], theta) for i in of_points_in]
+    of_sets = {i: prediction.table.sets[i].instrument for i in rows}
+    instrument = min(of_sets.values(), key=lambda each: each.frame_order)
+    mine = [i for i, each in of_sets.items() if each.name == instrument.name]
+    columns = [_free_targets(prediction, i, rows[i], free) for i in mine]
+    parts = [_points(prediction, evaluation, i, rows[i], theta) for i in mine]
     places, turns = (np.concatenate(each) for each in zip(*parts, strict=True))
-    # rows of what was read at all: of a machine in a plane, say, not across it
-    never = np.isnan(values).all(axis=0)
-    read = np.isfinite(values[:, ~never]).all(axis=1)
-    if not read.any() or never[:2].all():
-        up = values[:, 2]
-        known = np.isfinite(up)
-        return of_heights(up[known], places[known]) if known.any() else np.zeros(6)
-    firsts, target = np.unique(columns[read, 0], return_inverse=True)
-    pairs = PointPairs(
-        values=np.where(never, 0.0, values)[read],
-        point=places[read],
-        turn=turns[read],
-        target=target.reshape(-1) - int(firsts[0] < 0),
+    frame, shifts = instrument.frame(
+        Sighting(
+            values=np.concatenate([prediction.table.sets[i].values[rows[i]] for i in mine]),
+            predicted=np.concatenate(
+                [_seen(prediction, evaluation, i, rows[i], parameters, theta) for i in mine]
+            ),
+            point=places,
+            turn=turns,
+            target=np.concatenate(columns)[:, 0],
+        )
     )
-    frame, shifts = of_points(pairs)
-    for first, shift in zip(firsts[firsts >= 0].tolist(), shifts, strict=True):
+    for first, shift in shifts.items():
         _shift(prediction, theta, free, first, shift)
     return frame
 
@@ -219,8 +199,12 @@ def _free_targets(prediction: Prediction, i: int, rows: IntArray, free: BoolArra
 def _points(
     prediction: Prediction, evaluation: Evaluation, i: int, rows: IntArray, theta: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Where targets of rows of set `i` are in the base frame (N, 3), and how they are turned."""
-    target = prediction.arguments_of(i, theta)["target"]
+    """Where targets of rows of set `i` are in the base frame (N, 3), and how they are turned.
+
+    Of readings without targets, the platform.
+    """
     pose = evaluation.pose[prediction.table.pose_of[i][rows]]
-    places, _, turn = instruments.points(pose, np.ascontiguousarray(target[rows]))
+    target = prediction.arguments_of(i, theta).get("target")
+    own = np.zeros((len(rows), 3)) if target is None else np.ascontiguousarray(target[rows])
+    places, _, turn = instruments.points(pose, own)
     return places, turn

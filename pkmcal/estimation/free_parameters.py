@@ -6,22 +6,30 @@ And with which start, prior and bounds, by the names that the user states.
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from pkmcal.arguments import did_you_mean, shown
-from pkmcal.arrays import FloatArray, IntArray, mm_per_unit
+from pkmcal.arrays import FloatArray
 from pkmcal.estimation.fit_data import PLACE, FitData, Numbers
-from pkmcal.estimation.parameters import FRAME, Asked, Bounds, Parameters, Prior
+from pkmcal.estimation.own_residuals import (
+    ROLE,
+    Residual,
+    at_parameters,
+    brought_numbers,
+    residual_name,
+)
+from pkmcal.estimation.parameters import FRAME, Asked, Bounds, Parameters
 from pkmcal.estimation.prior_functions import is_function, prior_functions
+from pkmcal.estimation.scales import unit_scales
 from pkmcal.estimation.sessions import Scope, label, matches, scopes
+from pkmcal.estimation.uncertain_numbers import spread, uncertain_names
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
-from pkmcal.geometry.load import is_of_load
+from pkmcal.geometry.elastic import is_kinematic
 from pkmcal.kinematics.calibratable import Calibratable
-from pkmcal.kinematics.robot import Robot
-from pkmcal.measurements.measurements import Measurements
 
 _LEAST_PRIOR, _MOST_PRIOR = 1e-15, 1e15  # mm or rad, whose squares are numbers
 
@@ -47,25 +55,32 @@ def parameters(
     ValueError, TypeError
         An unknown or tied name, nothing free, a prior or a bound that does not fit.
     """
-    geometry, places = robot.geometry, _free_places(robot, asked)
-    beside = _beside_geometry(datasets)
+    geometry = robot.geometry
+    free, along = _free_names(robot, asked)
+    places = np.array([geometry.names.index(name) for name in (*free, *along)], dtype=np.intp)
+    beside = _beside_geometry(datasets) | _of_residuals(asked.residuals, geometry.names)
     ends = np.cumsum([len(places), *(len(each.names) for each in beside.values())]).tolist()
     blocks = dict(zip(beside, map(slice, ends, ends[1:]), strict=False))
     numbers = [geometry.names[i] for i in places]
     numbers += [name for each in beside.values() for name in each.names]
     scope = scopes(numbers, blocks, asked.per_session, asked.by_set)
     entries = _entries(len(places), scope, blocks, datasets, asked.held_points)
+    fitted_along = {*range(len(free), len(places))}
+    for (role, _), block in blocks.items():
+        if role in asked.uncertain_roles:
+            fitted_along |= {*range(block.start, block.stop)}
+    entries = _without_exact(entries, numbers, fitted_along, asked)
     number_of = np.array([number for number, _ in entries], dtype=np.intp)
     names = tuple(numbers[j] + (f"@{behind}" if behind else "") for j, behind in entries)
+    uncertain = np.isin(number_of, sorted(fitted_along))
+    of_uncertain = spread(
+        asked.uncertainty, [n for n, own in zip(names, uncertain, strict=True) if own]
+    )
     every = [geometry.units[i] for i in places]
     every += [unit for each in beside.values() for unit in each.units]
+    _refuse_twice(names)
     units = tuple(str(every[j]) for j in number_of)
-    travel = max(_travel(robot, data.measured) for data in datasets)
-    of_unit = {"mm": 1.0, "rad": 1.0 / robot.length, "1": 1.0 / travel}
-    of_unit |= {"1/mm": 1.0 / travel**2, "1/rad": robot.length / travel**2}
-    of_unit["1/mm2"] = of_unit["1/mm"] / robot.length
-    pull = max(_pull(robot, data.measured) for data in datasets)
-    of_unit |= {"1/N": 1.0 / travel / pull, "N": pull / robot.length}
+    of_unit = unit_scales(robot, [data.measured for data in datasets])
     of_number = [np.full(len(places), np.nan)]  # where the unit says the scale
     of_number += [
         np.full(len(each.names), np.nan) if each.scale is None else each.scale
@@ -80,13 +95,16 @@ def parameters(
     starts = [geometry.values[places], *(each.start for each in beside.values())]
     values = np.concatenate(starts)[number_of]
     count = int(np.count_nonzero(number_of < len(places)))
-    lower, upper = _bounds(asked.bounds, names, values, strict=like is None)
+    found = [n if not own else "" for n, own in zip(names, uncertain, strict=True)]
+    lower, upper = _bounds(asked.bounds, found, values, strict=like is None)
+    prior = _prior(asked, found, scale, count, strict=like is None)
+    prior[uncertain] = np.sqrt(np.diagonal(of_uncertain))
     made = Parameters(
         names=names,
         units=units,
         start=values,
         scale=scale,
-        prior=_prior(asked.prior, names, scale, count, strict=like is None),
+        prior=prior,
         lower=lower,
         upper=upper,
         number_of=number_of,
@@ -98,14 +116,29 @@ def parameters(
         origin={},
         robot=robot,
         asked=asked,
+        uncertain=uncertain,
+        spread=of_uncertain,
     )
     made = replace(made, origin={first: np.zeros(6) for first in made.motions})
+    if like is None:
+        made = replace(made, residuals=asked.residuals)
+        _require_dependence(made)
     if not isinstance(asked.prior, Mapping):
         return made
     start = dict(zip(names, zip(values.tolist(), units, strict=True), strict=True))
     columns = {session: made.geometry_of(session) for session in made.sessions or ("",)}
     given = (asked.prior, robot, start, places, columns)
     return replace(made, functions=prior_functions(*given, strict=like is None))
+
+
+def _refuse_twice(names: Sequence[str]) -> None:
+    """Refuse two parameters of one name: what is said of one would be taken for the other."""
+    for name, several in Counter(names).items():
+        if several > 1:
+            raise ArgumentError(
+                f"{name}: {several} different parameters have this name; a reading or an effect"
+                " has to give its numbers names that no others have"
+            )
 
 
 def _scale(of_unit: Mapping[str, float], name: str, unit: str) -> float:
@@ -117,8 +150,11 @@ def _scale(of_unit: Mapping[str, float], name: str, unit: str) -> float:
     return of_unit[unit]
 
 
-def _free_places(robot: Calibratable, asked: Asked) -> IntArray:
-    """Places of the free numbers in the geometry's values."""
+def _free_names(robot: Calibratable, asked: Asked) -> tuple[list[str], list[str]]:
+    """Numbers of the geometry that are looked for, and those that are uncertain beside them.
+
+    A number that is held is exact.
+    """
     geometry, free = robot.geometry, asked.free
     if free is None:
         free = robot.model.free
@@ -131,12 +167,34 @@ def _free_places(robot: Calibratable, asked: Asked) -> IntArray:
     chosen = geometry.match(free, "free")
     if not chosen:
         raise ArgumentError("free: name at least one parameter")
-    if asked.fix:
-        held = geometry.match(asked.fix, "fix")
+    chosen = list(dict.fromkeys([*chosen, *asked.of_effects]))
+    held = geometry.match(asked.fix, "fix") if asked.fix else []
+    along = uncertain_names(asked.uncertainty, robot, (*chosen, *held))
+    if held:
         chosen = [name for name in chosen if name not in held]
         if not chosen:
             raise ArgumentError("fix: no parameter is left free")
-    return np.array([geometry.names.index(name) for name in chosen], dtype=np.intp)
+    return chosen, along
+
+
+def _without_exact(
+    entries: Sequence[tuple[int, str]],
+    numbers: Sequence[str],
+    fitted_along: set[int],
+    asked: Asked,
+) -> list[tuple[int, str]]:
+    """Parameters without those numbers of frames and points of which no uncertainty is stated."""
+    kept = []
+    for number, behind in entries:
+        name = numbers[number] + (f"@{behind}" if behind else "")
+        if number not in fitted_along or spread(asked.uncertainty, [name])[0, 0] > 0.0:
+            kept.append((number, behind))
+        elif name.startswith(("frame.", "tool.")):
+            raise ArgumentError(
+                f"uncertainty: {name} has none, and other numbers of {name.partition('.')[0]} have"
+                " one: state all six"
+            )
+    return kept
 
 
 def _beside_geometry(datasets: Sequence[FitData]) -> dict[tuple[str, str], Numbers]:
@@ -155,6 +213,39 @@ def _beside_geometry(datasets: Sequence[FitData]) -> dict[tuple[str, str], Numbe
                     " measurements; give different targets different target_names"
                 )
     return found
+
+
+def _of_residuals(
+    residuals: Sequence[Residual], known: Sequence[str]
+) -> dict[tuple[str, str], Numbers]:
+    """The numbers that residuals bring, one by one: each is common to all rows."""
+    found: dict[tuple[str, str], Numbers] = {}
+    for each in residuals:
+        if (own := brought_numbers(each)) is None:
+            continue
+        for i, name in enumerate(own.names):
+            if name in known or (ROLE, name) in found:
+                raise ArgumentError(
+                    f"residuals: {residual_name(each)} brings {name}, which there is already"
+                )
+            alone = slice(i, i + 1)
+            found[ROLE, name] = Numbers(
+                own.names[alone], own.units[alone], np.arange(1), own.start[alone]
+            )
+    return found
+
+
+def _require_dependence(chosen: Parameters) -> None:
+    """Refuse residuals that nothing free changes where the search begins."""
+    for each in chosen.residuals:
+        _, slopes = at_parameters(
+            each, chosen.by_name, chosen.rates_by_name, chosen.start, chosen.scale
+        )
+        if not slopes.any(axis=1).all():
+            raise ArgumentError(
+                f"residuals: {residual_name(each)} does not change with any free number where the"
+                " search begins"
+            )
 
 
 def _sessions(datasets: Sequence[FitData]) -> tuple[str, ...]:
@@ -178,6 +269,9 @@ def _entries(
     found += [(j, name) for name in _sessions(datasets) for j in own if scope[j] == "session"]
     for point, block in blocks.items():
         if point in held:
+            continue
+        if point[0] == ROLE:
+            found += [(j, "") for j in range(block.start, block.stop)]
             continue
         kind = scope[block.start]
         behind = dict.fromkeys(
@@ -203,48 +297,36 @@ def _where_read(data: FitData, point: tuple[str, str]) -> tuple[str, ...]:
     return ()
 
 
-def _travel(robot: Calibratable, measured: Measurements) -> float:
-    """Largest actuator coordinate, mm; an angle counts as its arc."""
-    arcs = measured.actuators * mm_per_unit(robot.actuator_units, robot.length)
-    return max(1.0, float(np.abs(arcs).max()))
-
-
-def _pull(robot: Calibratable, measured: Measurements) -> float:
-    """Largest force that is known, N: of tensions, and of a load that they balance."""
-    load = robot.model.balanced_load if isinstance(robot, Robot) else None
-    forces = [1.0] if load is None else [1.0, *load.force]
-    if measured.tension is not None:
-        forces.append(float(np.nanmax(np.abs(measured.tension), initial=0.0)))
-    return float(np.abs(forces).max())
-
-
 def _matching(argument: str, pattern: object, names: Sequence[str], strict: bool) -> list[int]:
     if not isinstance(pattern, str):
         raise ArgumentTypeError(f"{argument}: names must be str, found {pattern!r}")
-    hits = [i for i, name in enumerate(names) if matches(pattern, name)]
+    hits = [i for i, name in enumerate(names) if name and matches(pattern, name)]
     if strict and not hits:
-        raise ArgumentError(
-            f"{argument}: no free parameter matches {pattern!r}{did_you_mean(pattern, names)}"
-        )
+        known = did_you_mean(pattern, filter(None, names))
+        raise ArgumentError(f"{argument}: no free parameter matches {pattern!r}{known}")
     return hits
 
 
 def _prior(
-    prior: Prior, names: Sequence[str], scale: FloatArray, of_machine: int, strict: bool
+    asked: Asked, names: Sequence[str], scale: FloatArray, of_machine: int, strict: bool
 ) -> FloatArray:
+    """What is known of each parameter: as effects have it, but where `prior` names it."""
+    prior = asked.prior
     sigma = np.full(len(names), np.inf)
-    if prior is None:
-        return sigma
+    of_effects = [asked.of_effects.get(name.partition("@")[0], np.inf) for name in names]
+    if isinstance(prior, Mapping):
+        sigma[:] = of_effects
     if isinstance(prior, Mapping):
         for pattern, value in prior.items():
             if is_function(pattern, value):
                 continue
             hits = _matching("prior", pattern, names, strict)
             sigma[hits] = _positive(f"prior of {pattern}", value)
-    else:
+        return sigma
+    if prior is not None:
         sigma[:of_machine] = _positive("prior", prior) * scale[:of_machine]
-        sigma[[is_of_load(name) for name in names]] = np.inf  # forces are no lengths
-    return sigma
+        sigma[[not is_kinematic(name) for name in names]] = np.inf  # forces are no lengths
+    return np.where(np.isfinite(of_effects), of_effects, sigma)
 
 
 def _positive(what: str, value: object) -> float:

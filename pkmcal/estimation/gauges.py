@@ -2,7 +2,8 @@
 
 Closures do not change when all that stands on the base moves as one body, axes included, nor when
 all that is on the platform does, nor when every length and every gain grows by the same factor.
-Where tensions balance a load, nor when all forces grow by the same factor and stretch falls by it.
+Where tensions balance a load, or weights a machine that yields, nor when all forces grow by the
+same factor and stretch and compliances fall by it.
 Such combinations of parameters are named by what they are, not by their numbers.
 """
 
@@ -13,6 +14,7 @@ import numpy as np
 from pkmcal.arrays import FloatArray
 from pkmcal.core.library import AXES, SLOTS
 from pkmcal.estimation.chain_gauges import frame_motions
+from pkmcal.estimation.elastic_gauges import elastic_motions
 from pkmcal.estimation.parameters import Parameters
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.load import AT, CELL, FORCE
@@ -76,14 +78,14 @@ def gauges(
     count = unidentifiable.shape[1] - span.shape[1]
     of_all = np.zeros((len(there), free.shape[1]))
     of_all[there] = free
-    return tuple(_texts(of_all)), left_over[:, :count]
+    return tuple(_texts(of_all, robot.model.elastic is not None)), left_over[:, :count]
 
 
 def _motions(robot: Robot) -> FloatArray:
     """Changes of all numbers (*slots, 14): shifts and turns of the base, the scale, the platform's.
 
-    And the scale of forces, where tensions balance a load. Turns are about the mean of the base's
-    points, and of the platform's.
+    And the scale of forces, where tensions balance a load or something yields. Turns are about the
+    mean of the base's points, and of the platform's.
     """
     slots, limbs = robot.slots, robot.model.limbs
     balanced = robot.model.balanced_load is not None
@@ -115,6 +117,9 @@ def _motions(robot: Robot) -> FloatArray:
             if key == "stretch":  # of no length
                 change.reshape(-1, _MOTIONS)[place, _SCALE] = 0.0
                 change.reshape(-1, _MOTIONS)[place, _FORCES] = -slots.flat[place] * balanced
+    if robot.model.elastic is not None:
+        for place, moved in elastic_motions(robot, _PLATFORM, _SCALE, _FORCES).items():
+            change.reshape(-1, _MOTIONS)[place] = moved
     return change
 
 
@@ -178,7 +183,7 @@ def _of_load(parameters: Parameters) -> dict[int, FloatArray]:
     return {k: by[own] for k, own in enumerate(parameters.names) if own in by}
 
 
-def _texts(free: FloatArray) -> list[str]:
+def _texts(free: FloatArray, yields: bool = False) -> list[str]:
     """Motions (14, d) in words."""
     alone = [k for k in range(_MOTIONS) if np.linalg.norm(free[k]) > 1.0 - _MIXED]
     texts = []
@@ -203,7 +208,12 @@ def _texts(free: FloatArray) -> list[str]:
         texts.append(f"{what} in {held}{more} way{'s' * (held > 1)}")
     if grows or _SCALE in alone:
         texts.append("the common scale: all lengths and gains may grow by the same factor")
-    if _FORCES in alone:
+    if _FORCES in alone and yields:
+        texts.append(
+            "the scale of forces: all weights and forces may be s times what they are, compliances"
+            " falling by it; state a payload, a mass or a stiffness"
+        )
+    elif _FORCES in alone:
         texts.append(
             "the scale of forces: the load and all tensions may grow by the same factor, stretch"
             " and gains of load cells falling by it"

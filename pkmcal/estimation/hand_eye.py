@@ -3,8 +3,9 @@
 What was measured is M = F P T: the frame F, the platform's pose P, the tool T. The rotations follow
 from a singular value decomposition (M. Shah, Solving the robot-world/hand-eye calibration problem
 using the Kronecker product, Journal of Mechanisms and Robotics 5 (2013) 031007), the places
-linearly. What poses that turn too little do not determine stays where it is: a tool that is not
-turned against the platform.
+linearly. Where poses hardly turn the frame's turn is that of their places: of both starts the one
+that misfits less is taken. What poses that turn too little do not determine stays where it is: a
+tool that is not turned against the platform.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from pkmcal.readings.alignment import (
 
 _ALIKE = 1e-4  # share by which singular values differ of turnings that poses do not tell apart
 _ROUNDS = 30  # of turning frame and tool in turn
+_LEAST = 1e-9  # share by which no turn is preferred to one about a line of places
 
 
 def of_tool(measured: FloatArray, pose: FloatArray) -> FloatArray:
@@ -55,11 +57,40 @@ def of_frame_and_tool(measured: FloatArray, pose: FloatArray) -> tuple[FloatArra
     for _ in range(_ROUNDS):
         turn = nearest_rotations(_mean(m @ back @ p.transpose(0, 2, 1)))
         back = nearest_rotations(_mean(m.transpose(0, 2, 1) @ turn @ p))
+    by_places = _turn_of_places(at, origin)
+    starts = [
+        (turn, back),
+        (by_places, nearest_rotations(_mean(m.transpose(0, 2, 1) @ by_places @ p))),
+    ]
+    laid = [_laid(m, p, at, origin, *each) for each in starts]
+    _, frame, tool = min(laid, key=lambda each: each[0])
+    return frame, tool
+
+
+def _turn_of_places(at: FloatArray, origin: FloatArray) -> FloatArray:
+    """The turn (3, 3) of places (N, 3) to others; as little as they leave open."""
+    both = centred(at).T @ centred(origin)
+    turn: FloatArray = nearest_rotations(both + _LEAST * float(np.linalg.norm(both)) * np.eye(3))
+    return turn
+
+
+def _laid(
+    m: FloatArray,
+    p: FloatArray,
+    at: FloatArray,
+    origin: FloatArray,
+    turn: FloatArray,
+    back: FloatArray,
+) -> tuple[float, FloatArray, FloatArray]:
+    """Squared misfit of a frame and a tool so turned, and both; turnings count as arcs."""
     lever = centred(p).reshape(-1, 3)
     off = at @ turn - origin
     place = inverse_above(lever, TILT * np.sqrt(len(p))) @ centred(off).ravel()
     where = turn @ _mean(off - p @ place)
-    return frame_of(turn, where), frame_of(back.T, place)
+    places = float((centred(off - p @ place) ** 2).sum())
+    size = float((centred(origin) ** 2).sum()) / len(p)
+    turned = float(((m - turn @ p @ back.T) ** 2).sum())
+    return places + size * turned, frame_of(turn, where), frame_of(back.T, place)
 
 
 def _motions(

@@ -14,6 +14,7 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray, first_largest
 from pkmcal.statistics.linear_fit import ROUNDING, few_rows
+from pkmcal.statistics.singular_values import svd
 
 _KINDS = 4  # kinds of parameters whose combinations are looked for
 # Nuisance parameters: one kind each, however many there are. A kind more is many combinations more.
@@ -68,7 +69,7 @@ def decompose(*jacobian: FloatArray) -> Decomposed:
     factor = few_rows(*jacobian)
     whole = np.zeros((max(n, len(factor)), n))
     whole[: len(factor)] = factor
-    _, singular, rows = np.linalg.svd(whole, full_matrices=False)
+    _, singular, rows = svd(whole)
     return singular, rows.T
 
 
@@ -196,7 +197,7 @@ def sparse_basis(unidentifiable: FloatArray, names: Sequence[str]) -> FloatArray
         away = ~member[:, list(support)].any(axis=1)
         _, singular, rows = np.linalg.svd(np.vstack([unidentifiable[away], np.zeros((d, d))]))
         inside = rows[np.count_nonzero(singular > _OUTSIDE) :].T
-        _, size, turn = np.linalg.svd(inside - found @ (found.T @ inside), full_matrices=False)
+        _, size, turn = svd(inside - found @ (found.T @ inside))
         new = inside @ turn[: np.count_nonzero(size > _OUTSIDE)].T
         if not new.shape[1]:
             continue

@@ -27,9 +27,11 @@ class Labels:
     set_of, row, pose, target, component : ndarray of int (M,)
         Rows count through all sets; a pose is that of `poses_of_rows`; components of the same name
         have the same number. Of mixtures, the row is the unit, and the set the first.
+    family : ndarray of int (M,)
+        Components of one unit have the same number.
     length : ndarray of bool (M,)
-        Whether it is in mm; of a pose the position. Where angles alone were read they count, as
-        arcs. Of mixtures none is.
+        Whether it is of the first unit of its reading, which a noise in mm is told of; of a pose
+        the position. Of mixtures none is.
     """
 
     set_of: IntArray
@@ -37,6 +39,7 @@ class Labels:
     pose: IntArray
     target: IntArray
     component: IntArray
+    family: IntArray
     length: BoolArray
 
 
@@ -54,18 +57,21 @@ def poses_of_rows(equations: Equations) -> IntArray:
 
 def labels(equations: Equations) -> Labels:
     """Label the equations."""
-    return _of_mixtures(equations) if equations.closures.unknowns else _of_readings(equations)
+    return _of_mixtures(equations) if equations.machines.unknowns else _of_readings(equations)
 
 
 def _of_readings(equations: Equations) -> Labels:
     names: dict[str, int] = {}
-    targets, components, lengths, rows = [], [], [], []
+    units: dict[str, int] = {}
+    targets, components, families, lengths, rows = [], [], [], [], []
     first = 0
     for m in equations.table.sets:
         targets.append(np.repeat(repeats.targets(m), len(m.components)))
         numbers = [names.setdefault(name, len(names)) for name in m.components]
         components.append(np.tile(np.array(numbers, dtype=np.intp), len(m)))
-        counted = [unit == "mm" or "mm" not in m.units for unit in m.units]
+        of_units = [units.setdefault(unit, len(units)) for unit in m.units]
+        families.append(np.tile(np.array(of_units, dtype=np.intp), len(m)))
+        counted = [unit == m.units[0] for unit in m.units]
         lengths.append(np.tile(np.array(counted, dtype=bool), len(m)))
         rows.append(np.repeat(np.arange(first, first + len(m)), len(m.components)))
         first += len(m)
@@ -77,6 +83,7 @@ def _of_readings(equations: Equations) -> Labels:
         pose=poses_of_rows(equations)[row],
         target=np.concatenate(targets)[read],
         component=np.concatenate(components)[read],
+        family=np.concatenate(families)[read],
         length=np.concatenate(lengths)[read],
     )
 
@@ -89,7 +96,8 @@ def _of_mixtures(equations: Equations) -> Labels:
     component = np.empty_like(unit)
     component[order] = np.arange(len(unit)) - np.repeat(np.cumsum(count) - count, count)
     nothing = np.zeros_like(unit)
-    return Labels(nothing, unit, pose, nothing, component, np.zeros(len(unit), dtype=bool))
+    none = np.zeros(len(unit), dtype=bool)
+    return Labels(nothing, unit, pose, nothing, component, nothing, none)
 
 
 def _poses_of_units(equations: Equations) -> IntArray:

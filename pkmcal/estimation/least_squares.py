@@ -23,6 +23,10 @@ _CONVERGED = (1, 2, 3, 4)  # as MINPACK says it
 Function = Callable[[FloatArray], FloatArray]
 
 
+class SingularError(ArgumentError):
+    """A search came to parameters with which the machine is singular in some pose."""
+
+
 @dataclass(frozen=True, eq=False)
 class Trail:
     """How far a search has come.
@@ -99,7 +103,7 @@ class Search:
 
     def at(self, trail: Trail, u: FloatArray, noise: FloatArray) -> Trail:
         """Evaluate the equations at scaled parameters (n,), poses found with this noise (G,)."""
-        same = not self.equations.closures.unknowns or _same(noise, trail.noise)
+        same = not self.equations.machines.unknowns or _same(noise, trail.noise)
         if same and _same(u, trail.u):
             return trail
         there = self.equations.at(self._theta(u), noise, trail.near)
@@ -133,7 +137,7 @@ class Search:
 
         Raises
         ------
-        ValueError
+        SingularError
             It does not exist, at a singularity of the machine.
         """
         found = self.own_jacobian(evaluation, noise)
@@ -334,7 +338,7 @@ def _same(one: FloatArray, other: FloatArray) -> bool:
 
 def _finite(jacobian: FloatArray) -> FloatArray:
     if not np.isfinite(jacobian).all():
-        raise ArgumentError(
+        raise SingularError(
             "no geometry near the present one agrees: the fit runs into poses"
             " where the actuators do not hold the machine (type-2 singular)"
         )

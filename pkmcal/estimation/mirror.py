@@ -32,7 +32,7 @@ def mirror_fits(equations: Equations, evaluation: Evaluation, noise: FloatArray)
     The poses are fitted there. Axes, such as those of swivels, are left as they are.
     """
     robot, parameters = evaluation.robot, equations.parameters
-    if not isinstance(robot, Robot) or not equations.closures.unknowns:
+    if not isinstance(robot, Robot) or not equations.machines.unknowns:
         return False
     if robot.model.chains is not None or robot.model.map not in _DIMENSIONS:
         return False

@@ -79,7 +79,7 @@ def worst_closures(equations: Equations, evaluation: Evaluation) -> FloatArray:
 
 def cell_rms(equations: Equations, evaluation: Evaluation) -> float:
     """How far tensions are off what load cells read, N; NaN where they are no unknowns."""
-    cells, system = equations.closures.cells, equations.system
+    cells, system = equations.machines.cells, equations.system
     if not cells or system is None:
         return float("nan")
     return rms(system.readings_off(evaluation)[:, -cells:][system.blocks.counts[:, -cells:]])
@@ -87,16 +87,16 @@ def cell_rms(equations: Equations, evaluation: Evaluation) -> float:
 
 def _closures_off(system: PoseSystem, evaluation: Evaluation) -> FloatArray:
     """`PoseSystem.readings_off` of the actuators, in mm."""
-    closures = system.closures
-    off: FloatArray = system.readings_off(evaluation) * closures.lengths(evaluation.machines)
-    return off[:, : closures.equations - closures.cells]
+    machines = evaluation.machines
+    off: FloatArray = system.readings_off(evaluation) * machines.lengths()
+    return off[:, : machines.equations - machines.cells]
 
 
 def rounding(equations: Equations, noise: FloatArray) -> float:
     """Length of the whitened rounding errors of what is predicted, for noise (G,)."""
-    length, readings, sigma = equations.parameters.robot.length, 0.0, equations.closures.sigma
+    length, readings, sigma = equations.parameters.robot.length, 0.0, equations.machines.sigma
     if equations.system is None or equations.whitening.any_read:
-        parts = [_rounded(m, length) for m in equations.table.sets]
+        parts = [rounding_of(m, length) for m in equations.table.sets]
         readings = float(np.linalg.norm(equations.whitening.whitened(parts, noise)))
     if equations.system is None or sigma is None:
         return readings
@@ -105,7 +105,7 @@ def rounding(equations: Equations, noise: FloatArray) -> float:
     return float(np.hypot(readings, np.linalg.norm(whitened)))
 
 
-def _rounded(measured: Measurements, length: float) -> FloatArray:
+def rounding_of(measured: Measurements, length: float) -> FloatArray:
     """Rounding errors (N, k) of what is predicted, mm and rad."""
     values = measured.values.reshape(len(measured), -1)
     lengths = np.array([unit == "mm" for unit in measured.units], dtype=bool)

@@ -103,7 +103,7 @@ def _modes(
     robot: Robot, actuators: FloatArray, pose: FloatArray, k: int, sound: BoolArray
 ) -> FloatArray:
     """Poses (j, 6) that the machine may have at the actuators of row `k`."""
-    found = robot.forward_all(actuators[k])
+    found = robot.rigid.forward_all(actuators[k])
     if found.complete or not sound.any():
         return found.poses
     there = np.flatnonzero(sound)

@@ -7,19 +7,23 @@ unless some numbers are of a session or set: see `sessions`.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.core.poses import compose, compose_rates
 from pkmcal.estimation.fit_data import Dependence, FitData
+from pkmcal.estimation.own_residuals import Residual, at_parameters, residual_name
 from pkmcal.estimation.prior_functions import PriorFunction
 from pkmcal.estimation.sessions import NONE, Scope, label
 from pkmcal.estimation.smoothness import smoothness_rows
+from pkmcal.estimation.uncertain_numbers import inverse_root
+from pkmcal.geometry.stated_uncertainty import NOTHING, StatedUncertainty
 from pkmcal.kinematics.calibratable import Calibratable
+from pkmcal.kinematics.robot import Robot
 
 Prior = float | Mapping[str, float | tuple[float, float]] | None
 Known = Literal["known", "unknown"]
@@ -44,6 +48,15 @@ class Asked:
         Names or wildcards of numbers of the geometry that are held.
     held_points : frozenset of (str, str)
         Unknown points that are held where the user puts them, by role and name.
+    of_effects : mapping of str to float
+        Numbers of the geometry that effects free beside `free`, and the standard deviation of what
+        is known of each, where `prior` does not name it.
+    uncertainty : StatedUncertainty
+        How wrong numbers may be that are not free.
+    uncertain_roles : frozenset of str
+        What readings depend on and is fitted along, since nothing but an uncertainty is stated.
+    residuals : tuple of callable
+        Residuals that are functions of named numbers.
     """
 
     free: str | Sequence[str] | None = None
@@ -53,6 +66,10 @@ class Asked:
     by_set: frozenset[str] = frozenset()
     fix: tuple[str, ...] = ()
     held_points: frozenset[tuple[str, str]] = frozenset()
+    of_effects: Mapping[str, float] = field(default_factory=dict)
+    uncertainty: StatedUncertainty = NOTHING
+    uncertain_roles: frozenset[str] = frozenset()
+    residuals: tuple[Residual, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,9 +111,16 @@ class Parameters:
         What they were made of.
     functions : tuple of PriorFunction
         What is known of functions of numbers.
+    residuals : tuple of callable
+        What else is known: residuals that are functions of numbers by name.
+    uncertain : ndarray of bool (n,)
+        Numbers that are not looked for, and fitted along as their uncertainty is stated.
+    spread : ndarray (u, u)
+        Stated covariance of these.
     drawn : ndarray (s,) or None
-        By how much functions of numbers and bends of tables of drive laws are off what is stated of
-        them, in standard deviations, where that is not 0: in replicates of the bootstrap.
+        By how much functions of numbers, residuals and bends of tables of drive laws are off what
+        is stated of them, in standard deviations, where that is not 0: in replicates of the
+        bootstrap.
     """
 
     names: tuple[str, ...]
@@ -115,7 +139,10 @@ class Parameters:
     origin: Mapping[int, FloatArray]
     robot: Calibratable
     asked: Asked
+    uncertain: BoolArray
+    spread: FloatArray
     functions: tuple[PriorFunction, ...] = ()
+    residuals: tuple[Residual, ...] = ()
     drawn: FloatArray | None = None
 
     def __len__(self) -> int:
@@ -129,7 +156,8 @@ class Parameters:
     def prior_rows(self, theta: FloatArray) -> FloatArray:
         """A row (p, n) for each prior at `theta`: its scaled derivative over its deviation.
 
-        First of parameters, then of functions, then of bends of tables.
+        First of free parameters, then of uncertain ones, of functions, of residuals, of bends of
+        tables.
         """
         return np.vstack([self._of_parameters, self.off_functions(theta)[1] * self.scale])
 
@@ -143,6 +171,11 @@ class Parameters:
         """How far functions and bends are off what is stated (s,), in deviations; by θ (s, n)."""
         rows, constant = self._smooth
         off: FloatArray = rows @ theta + constant
+        for each in self.residuals[::-1]:
+            values, slopes = at_parameters(
+                each, self.by_name, self.rates_by_name, theta, self.scale
+            )
+            off, rows = np.concatenate([values, off]), np.vstack([slopes, rows])
         if not self.functions:
             return off, rows
         found = [each.at(theta, self.robot, self.places) for each in self.functions]
@@ -154,20 +187,38 @@ class Parameters:
 
     @property
     def prior_names(self) -> list[str]:
-        """What each of `prior_rows` is of."""
-        stated = [n for n, s in zip(self.names, self.prior, strict=True) if np.isfinite(s)]
+        """What each of `prior_rows` is of, but for uncertain numbers."""
+        stated = [self.names[i] for i in self._stated]
         stated += [each.name for each in self.functions]
+        for each in self.residuals:
+            stated += [residual_name(each)] * len(
+                at_parameters(each, self.by_name, self.rates_by_name, self.start, self.scale)[0]
+            )
         return stated + [
             f"the smoothness at {self.names[np.abs(row).argmax()]}"
             for row in self._smooth[0] * self.scale
         ]
 
+    @property
+    def _stated(self) -> IntArray:
+        """Free parameters with a prior of their own."""
+        return np.flatnonzero(np.isfinite(self.prior) & ~self.uncertain)
+
+    @property
+    def prior_of_uncertain(self) -> slice:
+        """Which of `prior_rows` are those of uncertain numbers."""
+        first = len(self._stated)
+        return slice(first, first + len(self.spread))
+
     @cached_property
     def _of_parameters(self) -> FloatArray:
-        sigma = self.prior / self.scale
-        stated = np.flatnonzero(np.isfinite(sigma))
+        sigma, stated = self.prior / self.scale, self._stated
         rows: FloatArray = np.eye(len(sigma))[stated] / sigma[stated, None]
-        return rows
+        if not len(self.spread):
+            return rows
+        along = np.zeros((len(self.spread), len(sigma)))
+        along[:, self.uncertain] = inverse_root(self.spread) * self.scale[self.uncertain]
+        return np.vstack([rows, along])
 
     @cached_property
     def _smooth(self) -> tuple[FloatArray, FloatArray]:
@@ -232,6 +283,32 @@ class Parameters:
         values: FloatArray = self.robot.geometry.values.copy()
         values[self.places] = theta[self.geometry_of() if columns is None else columns]
         return values
+
+    def by_name(self, theta: FloatArray) -> dict[str, float]:
+        """All numbers at `theta` (n,) by name: of the geometry, and beside it.
+
+        What each session has for itself is there by its name with the session alone.
+        """
+        robot, values = self.robot, self.values_at(theta)
+        if isinstance(robot, Robot):  # numbers may be tied to others
+            values = robot.with_values(values).geometry.values
+        found = dict(zip(robot.geometry.names, values.tolist(), strict=True))
+        for place, scope in zip(self.places.tolist(), self.scope, strict=False):
+            if scope != "common":
+                del found[robot.geometry.names[place]]
+        return found | dict(zip(self.names, self.reported(theta).tolist(), strict=True))
+
+    def rates_by_name(self, theta: FloatArray) -> dict[str, FloatArray]:
+        """Derivative (n,) of each of `by_name` by the parameters."""
+        geometry, columns = self.robot.geometry, self.geometry_of()
+        rates = np.eye(len(geometry.values))
+        if isinstance(self.robot, Robot):
+            chain = self.robot.with_values(self.values_at(theta)).geometry.chain
+            rates[: len(chain)] = chain
+        by_theta = np.zeros((len(rates), len(self)))
+        by_theta[:, columns] = rates[:, self.places]
+        own = dict(zip(self.names, self.reported_rates(theta), strict=True))
+        return dict(zip(geometry.names, by_theta, strict=True)) | own
 
     def aligned(
         self, theta: FloatArray, first: int, frame: FloatArray

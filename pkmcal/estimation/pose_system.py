@@ -12,7 +12,7 @@ from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.prediction import Prediction
 from pkmcal.estimation.row_blocks import PoseBlocks
 from pkmcal.estimation.row_states import RowStates
-from pkmcal.estimation.session_machines import Machines, SessionClosures
+from pkmcal.estimation.session_machines import Machines
 from pkmcal.estimation.whitening import Whitening
 
 
@@ -26,7 +26,6 @@ class PoseSystem:
 
     prediction: Prediction
     whitening: Whitening
-    closures: SessionClosures
     blocks: PoseBlocks
 
     def best(
@@ -37,21 +36,21 @@ class PoseSystem:
         def whitened(states: RowStates) -> tuple[FloatArray, FloatArray]:
             return self.whitened(machines, states, theta, noise)
 
-        return self.blocks.elimination.best(self.closures, machines, states, whitened)
+        return self.blocks.elimination.best(machines, states, whitened)
 
     def whitened(
         self, machines: Machines, states: RowStates, theta: FloatArray, noise: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """Predicted less measured (E,), whitened, and its derivative by the unknowns (E, u)."""
         blocks, table = self.blocks, self.prediction.table
-        off, by_unknown = self.closures.residual(machines, states)
+        off, by_unknown = machines.residual(states)
         factors = noise[blocks.groups]
         off /= factors
         by_unknown /= factors[:, None]
         equation, by_unknown = blocks.counted(off), blocks.counted(by_unknown)
         if not self.whitening.any_read:
             return equation, by_unknown
-        twists = self.closures.twists(machines, states)
+        twists = machines.twists(states)
         predicted = self.prediction.at(states.pose, theta)
         residuals = self.prediction.residuals(predicted)
         by_pose = [
@@ -81,13 +80,11 @@ class PoseSystem:
         """Derivative (M, n) of what is predicted by the parameters, whitened and reduced."""
         p, blocks = self.prediction.parameters, self.blocks
         columns = self.prediction.table.machine_columns
-        of_closures = self.closures.by_numbers(
-            evaluation.machines, evaluation.states, p.places, columns, len(p)
-        )
+        of_closures = evaluation.machines.by_numbers(evaluation.states, p.places, columns, len(p))
         of_closures /= noise[blocks.groups][:, None]
         by_all = blocks.counted(of_closures)
         if self.whitening.any_read:
-            of_readings = self.prediction.jacobian(evaluation, self.closures)
+            of_readings = self.prediction.jacobian(evaluation)
             by_all = np.concatenate([by_all, self.whitening.whiten(of_readings, noise)])
         _, by_unknown, _ = self.at(evaluation, noise)
         found, following = blocks.elimination.reduced(by_unknown, by_all)
@@ -121,7 +118,7 @@ class PoseSystem:
         redundancy = blocks.elimination.redundancy(by_unknown, weights, leverage)
         freedom[blocks.counts] = redundancy[:own]
         if blocks.slack.any():
-            whole, _ = self.closures.residual(evaluation.machines, evaluation.states)
+            whole, _ = evaluation.machines.residual(evaluation.states)
             longer[blocks.slack] = -whole[blocks.slack] / noise[-1]
         return longer, freedom
 
@@ -133,18 +130,19 @@ class PoseSystem:
             off = off[: self.blocks.slack.size].reshape(self.blocks.slack.shape)
             off = off * factors[self.blocks.groups]
         else:
-            off, _ = self.closures.residual(evaluation.machines, evaluation.states)
-        needed: FloatArray = off if self.closures.sigma is None else off * self.closures.sigma
+            off, _ = evaluation.machines.residual(evaluation.states)
+        sigma = evaluation.machines.sigma
+        needed: FloatArray = off if sigma is None else off * sigma
         return needed
 
     def redrawn(
         self, at: Evaluation, noise: FloatArray, reduced: FloatArray
-    ) -> tuple[SessionClosures, FloatArray]:
-        """Closures and whitened residuals of readings whose reduced equations are these (M,)."""
+    ) -> tuple[FloatArray, FloatArray]:
+        """Change of closures, and whitened residuals of readings, with these reduced ones (M,)."""
         blocks = self.blocks
         off, by_unknown, _ = self.at(at, noise)
         errors = blocks.elimination.expanded(by_unknown, reduced)
         change, own = np.zeros(blocks.counts.shape), int(blocks.counts.sum())
         change[blocks.counts] = -(errors + off)[:own]
         change *= noise[blocks.groups]
-        return self.closures.shifted(change), errors[own:]
+        return change, errors[own:]

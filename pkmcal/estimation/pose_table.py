@@ -12,16 +12,23 @@ from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.parameters import Parameters
 from pkmcal.estimation.tensioned_poses import Cells, cells_of, check_cells
+from pkmcal.exceptions import ArgumentError
+from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.kinematics.drive_state import DriveState
+from pkmcal.measurements import repeats
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.tension import filled_tension
+from pkmcal.statistics.linear_fit import numbered
+
+CHANCE = 3  # rows of a set that may equal those of another one by coarse digits alone
 
 
 @dataclass(frozen=True, eq=False)
 class PoseTable:
     """The rows of all sets, and the distinct poses that they were read at.
 
-    Rows with the same actuators, and the same noise of these, are at one pose.
+    Rows with the same actuators, and the same noise of these, are at one pose. Where nothing else
+    was read, each such row is a reading of the actuators that has a pose of its own.
 
     Attributes
     ----------
@@ -89,23 +96,27 @@ def pose_table(datasets: Sequence[FitData], parameters: Parameters) -> PoseTable
     double = [i for i, m in enumerate(sets) if m.other is not None]
     rows = np.concatenate([data.rows for data in datasets])
     sources = [*sets, *(sets[i] for i in double)]
+    _require_loads(robot, sets)
     cells = cells_of(robot, sources)
     known = _commands(sets, sources, cells)
     commands = np.hstack([*known.values()])
     machine_columns, machine_of = _machines(columns[:, : len(parameters.places)], part_of)
     machine = np.concatenate([*machine_of, *(machine_of[i] for i in double)])
     several = len(machine_columns) > 1
+    read = [np.isfinite(m.values).reshape(len(m), -1).sum(axis=1) for m in sets]
+    commands = np.column_stack([commands, _again(sets, read, commands)])
     key = np.column_stack([commands, machine]) if several else commands
     distinct, first, inverse = np.unique(key, axis=0, return_index=True, return_inverse=True)
     width = commands.shape[1]
-    parts = np.split(distinct[:, :width], len(known), axis=1)
+    ends = np.cumsum([part.shape[1] for part in known.values()])
+    parts = np.split(distinct[:, : width - 1], ends[:-1], axis=1)
     of_pose = dict(zip(known, map(np.ascontiguousarray, parts), strict=True))
-    tension, read = of_pose.get("tension"), None
+    tension, of_cells = of_pose.get("tension"), None
     if cells is not None:
-        read = Cells(_blank(of_pose["tension"]), of_pose.get("tension sigma"))
+        of_cells = Cells(_blank(of_pose["tension"]), of_pose.get("tension sigma"))
         of_rows = np.concatenate([rows, *(datasets[i].rows for i in double)])
-        check_cells(robot, read, of_rows[first])
-        tension = filled_tension(read.read)
+        check_cells(robot, of_cells, of_rows[first])
+        tension = filled_tension(of_cells.read)
     command_of_pose: IntArray = np.arange(len(distinct))
     if several:
         command_of_pose = np.unique(distinct[:, :width], axis=0, return_inverse=True)[1].reshape(-1)
@@ -117,19 +128,67 @@ def pose_table(datasets: Sequence[FitData], parameters: Parameters) -> PoseTable
         sets=sets,
         rows=rows,
         set_of=np.repeat(np.arange(len(sets)), count),
-        count=np.concatenate([np.isfinite(m.values).reshape(len(m), -1).sum(axis=1) for m in sets]),
+        count=np.concatenate(read),
         pose_of=tuple(place[: len(count)]),
         other_of=tuple(None if m.other is None else next(there) for m in sets),
         actuators=of_pose["actuators"],
         actuator_sigma=of_pose.get("sigma"),
-        state=DriveState(of_pose.get("approach"), tension),
-        cells=read,
+        state=DriveState(of_pose.get("approach"), tension, of_pose.get("load")),
+        cells=of_cells,
         columns=columns,
         part_of=part_of,
         machine_columns=machine_columns,
         machine_of_pose=machine[first],
         command_of_pose=command_of_pose,
     )
+
+
+def _again(
+    sets: Sequence[Measurements], read: Sequence[IntArray], commands: FloatArray
+) -> IntArray:
+    """How often each row (C,) without a reading was there before: equal ones are read again.
+
+    Rows of one set after another. A set all rows of which are in another one is a copy, which
+    counts with that one; second places, which come last, do not count.
+    """
+    again = np.zeros(len(commands), dtype=np.intp)
+    silent = np.flatnonzero(np.concatenate(read) == 0)
+    if not len(silent):
+        return again
+    target = np.concatenate([repeats.targets(m) for m in sets])[silent]
+    place = np.unique(commands[silent], axis=0, return_inverse=True)[1].reshape(-1)
+    key = numbered(place, target)
+    set_of = np.repeat(np.arange(len(sets)), [len(m) for m in sets])[silent]
+    seen = [np.zeros(0, dtype=np.intp)]
+    for i in range(len(sets)):
+        own = np.flatnonzero(set_of == i)
+        copied = len(own) > CHANCE and any(np.isin(key[own], other).all() for other in seen)
+        before = seen[0] if copied else np.concatenate(seen)
+        again[silent[own]] = _times(key[own], before)
+        seen += [] if copied else [key[own]]
+    return again
+
+
+def _times(key: IntArray, before: IntArray) -> IntArray:
+    """How often each key (N,) is among those `before`, and ahead of it."""
+    whole = np.concatenate([before, key])
+    order = np.argsort(whole, kind="stable")
+    first = np.flatnonzero(np.diff(whole[order], prepend=-1))
+    times = np.empty_like(whole)
+    times[order] = np.arange(len(whole)) - np.repeat(first, np.diff(first, append=len(whole)))
+    return times[len(before) :]
+
+
+def _require_loads(robot: Calibratable, sets: Sequence[Measurements]) -> None:
+    """Refuse sets with and without loads where those without would carry the stated payload."""
+    stated = [m.load is not None for m in sets]
+    payload = "payload.mass" in robot.geometry.names
+    if payload and any(stated) and not all(stated):
+        file = sets[stated.index(False)].file
+        raise ArgumentError(
+            f"measurements: {file or f'set {stated.index(False) + 1}'} states no load, others do,"
+            f" and the file of {robot.name} states a payload: state the load of all sets"
+        )
 
 
 def _machines(
@@ -147,9 +206,10 @@ def _commands(
 ) -> dict[str, FloatArray]:
     """What distinguishes the poses of rows, (N, n) each; those of second places come last."""
     noises = [m.actuator_sigma for m in sources if m.actuator_sigma is not None]
-    approach, tension = (
-        _of_all(each, [m.actuators for m in sources])
-        for each in zip(*(m.drive_state for m in sources), strict=True)
+    states = [m.drive_state for m in sets]
+    states += [m.other_drive_state for m in sets if m.other is not None]
+    approach, tension, load = (
+        _of_all(each, [len(m) for m in sources]) for each in zip(*states, strict=True)
     )
     given = {
         "actuators": np.concatenate(
@@ -162,6 +222,7 @@ def _commands(
         "approach": approach,
         "tension": tension if cells is None else _blank(cells.read),
         "tension sigma": None if cells is None else cells.sigma,
+        "load": load,
     }
     return {name: part for name, part in given.items() if part is not None}
 
@@ -172,11 +233,10 @@ def _blank(tension: FloatArray) -> FloatArray:
     return np.where(there, tension, np.where(np.isnan(tension), np.inf, np.nan))
 
 
-def _of_all(
-    parts: Sequence[FloatArray | None], actuators: Sequence[FloatArray]
-) -> FloatArray | None:
+def _of_all(parts: Sequence[FloatArray | None], rows: Sequence[int]) -> FloatArray | None:
     """The rows of all sets; 0 where a set states nothing, None where none states anything."""
-    if all(part is None for part in parts):
+    widths = [part.shape[1] for part in parts if part is not None]
+    if not widths:
         return None
-    pairs = zip(parts, actuators, strict=True)
-    return np.concatenate([np.zeros(q.shape) if part is None else part for part, q in pairs])
+    pairs = zip(parts, rows, strict=True)
+    return np.concatenate([np.zeros((n, widths[0])) if part is None else part for part, n in pairs])

@@ -16,11 +16,11 @@ from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.parameters import Parameters
 from pkmcal.estimation.pose_table import PoseTable, pose_table
 from pkmcal.estimation.row_states import RowStates
-from pkmcal.estimation.session_machines import SessionClosures
 from pkmcal.estimation.sessions import NONE, by_parameters
+from pkmcal.estimation.shapes import require_derivatives, require_moved, require_predicted
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.calibratable import Calibratable
-from pkmcal.readings import joint_angles, orientation
+from pkmcal.readings import orientation
 from pkmcal.readings.reading import At, Predicted, joined
 
 _BATCH = 1024  # rows whose derivatives by the parameters are made at once, as many as caches hold
@@ -117,7 +117,7 @@ class Prediction:
         guess = np.tile(self.parameters.robot.home, (len(table.actuators), 1))
         for i, (measured, place) in enumerate(zip(table.sets, table.pose_of, strict=True)):
             elsewhere = self.datasets[i].framed or "tool" in self.columns[i]
-            if measured.kind in ("pose", "position") and not elsewhere:
+            if measured.instrument.is_place and not elsewhere:
                 known = np.isfinite(measured.values)
                 ever = np.flatnonzero(known.any(axis=0))  # not across a plane, say
                 read = np.flatnonzero(known[:, ever].all(axis=1))
@@ -140,8 +140,7 @@ class Prediction:
                 " no surplus actuators; found others"
             )
         for m in self.table.sets:
-            follows = m.joint and joint_angles.follows_pose(self.parameters.robot, m.joint)
-            if m.kind in ("between", "angle") and not follows:
+            if not m.instrument.follows_pose(self.parameters.robot):
                 raise ArgumentError(
                     f"measurements: readings of kind {m.kind!r} need poses that follow from the"
                     " actuators: no actuator_sigma, and no surplus actuators"
@@ -159,12 +158,17 @@ class Prediction:
 
     def at(self, pose: FloatArray, theta: FloatArray) -> tuple[Predicted, ...]:
         """Predict the readings of each set at poses (K, 6), with their derivatives."""
-        return tuple(
-            self._moved(i, self._by_geometry_alone(i, pose, theta), pose, theta)
-            if m.components
-            else Predicted(np.empty((len(m), 0)), np.empty((len(m), 0, 6)))
-            for i, m in enumerate(self.table.sets)
-        )
+        found = []
+        for i, m in enumerate(self.table.sets):
+            if not m.components:
+                found.append(Predicted(np.empty((len(m), 0)), np.empty((len(m), 0, 6))))
+                continue
+            alone = self._by_geometry_alone(i, pose, theta)
+            require_predicted(m.instrument, len(m), alone)
+            moved = self._moved(i, alone, pose, theta)
+            require_derivatives(m.instrument, moved, self.numbers[i])
+            found.append(moved)
+        return tuple(found)
 
     def residuals(self, predicted: Sequence[Predicted]) -> tuple[FloatArray, ...]:
         """Measured less predicted of each set."""
@@ -211,19 +215,21 @@ class Prediction:
         change = np.zeros(predicted.values.shape)
         for effect in effects:
             for machine, rows in self._machines(i, theta):
-                growth = None
                 for place, by_twist in places:
                     at = place[rows]
                     found = effect.moved(machine, pose[at], table.actuators[at], rows, numbers)
+                    require_moved(effect, len(rows), found)
                     change[rows] += np.einsum("nki,ni->nk", by_twist[rows], found.twist)
                     for name, rates in found.by.items():
                         by.setdefault(name, np.zeros((*change.shape, rates.shape[2])))
                         by[name][rows] += by_twist[rows] @ rates
-                    growth = found.growth
-                if growth is not None and "target" in numbers and "target" in predicted.by:
-                    shift = numbers["target"][rows] * growth[:, None]
+                if found.growth is not None and "target" in numbers and "target" in predicted.by:
+                    shift = numbers["target"][rows] * found.growth[:, None]
                     by_target = predicted.by["target"][rows]
                     change[rows] += np.einsum("nki,ni->nk", by_target, shift)
+                    by_growth = by_target @ numbers["target"][rows][:, :, None]
+                    for name, rates in found.growth_by.items():
+                        by[name][rows] += by_growth * rates[:, None, :]
         values = table.sets[i].instrument.corrected(predicted.values, change)
         return replace(predicted, values=values, by=by)
 
@@ -255,16 +261,14 @@ class Prediction:
             return known
         return self.at(evaluation.pose, evaluation.theta)
 
-    def derivatives(
-        self, evaluation: Evaluation, closures: SessionClosures
-    ) -> Iterator[tuple[slice, list[Part]]]:
+    def derivatives(self, evaluation: Evaluation) -> Iterator[tuple[slice, list[Part]]]:
         """Derivatives of the predicted values by the parameters, batch by batch.
 
         A batch is rows through all sets, and for each set that has some of these its rows and their
         derivative (b, k, n). There is one batch where poses have unknowns.
         """
         table, count, size = self.table, len(self.table.rows), len(self.parameters)
-        predicted = self.predicted(evaluation)
+        predicted, machines = self.predicted(evaluation), evaluation.machines
         direct = [
             m.instrument.by_geometry(
                 self._place(i, evaluation.pose, evaluation.theta), self.parameters.places
@@ -272,12 +276,12 @@ class Prediction:
             for i, m in enumerate(table.sets)
         ]
         place = np.full(len(evaluation.pose), NONE)
-        for batch in lots(count, count if closures.unknowns else _BATCH):
+        for batch in lots(count, count if machines.unknowns else _BATCH):
             some = list(self._in_sets(batch))
             numbers = table.columns.shape[1]
             parts = [np.zeros((*predicted[i].values[rows].shape, numbers)) for i, rows in some]
-            for poses, twists in closures.twists_by_numbers(
-                evaluation.machines, evaluation.states, self.parameters.places, self._poses_of(some)
+            for poses, twists in machines.twists_by_numbers(
+                evaluation.states, self.parameters.places, self._poses_of(some)
             ):
                 place[poses] = np.arange(len(poses))
                 for (i, rows), part in zip(some, parts, strict=True):
@@ -294,14 +298,14 @@ class Prediction:
                 found.append((i, rows, read.by_difference(wide, residual)))
             yield batch, found
 
-    def jacobian(self, evaluation: Evaluation, closures: SessionClosures) -> list[FloatArray]:
+    def jacobian(self, evaluation: Evaluation) -> list[FloatArray]:
         """Derivative of the predicted values of each set to the parameters, (N, k, n).
 
         With the opposite sign that of the residuals.
         """
         n = len(self.parameters)
         found = [np.empty((*each.shape, n)) for each in evaluation.residuals]
-        for _, parts in self.derivatives(evaluation, closures):
+        for _, parts in self.derivatives(evaluation):
             for i, rows, part in parts:
                 found[i][rows] = part
         return found
@@ -357,5 +361,9 @@ def _add_motion(
 
     `by_twist` is (N, k, 6), `place` (N,) which of the twists moves each row; `NONE`: none of them.
     """
+    into = part[:, :, : twists.shape[2]]
+    if np.array_equal(place, np.arange(len(twists))):  # each its own: copies would take most time
+        into += by_twist @ twists
+        return
     moved = np.flatnonzero(place != NONE)
-    part[moved, :, : twists.shape[2]] += by_twist[moved] @ twists[place[moved]]
+    into[moved] += by_twist[moved] @ twists[place[moved]]

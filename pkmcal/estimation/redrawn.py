@@ -23,9 +23,10 @@ def redrawn(
     readings there, as `Equations.residual`. `noise` (G,) is as in `Whitening`, `drawn` (s,) as in
     `Parameters`; `prior_centre` (n,) is another centre of the prior.
     """
-    errors, closures = reduced, equations.closures
+    errors, machines = reduced, equations.machines
     if equations.system is not None:
-        closures, errors = equations.system.redrawn(at, noise, reduced)
+        change, errors = equations.system.redrawn(at, noise, reduced)
+        machines = machines.shifted(change)
     residuals = tuple(equations.whitening.unwhiten(errors, noise[: len(equations.table.sets)]))
     sets = tuple(
         replace(m, values=m.instrument.corrected(values, residual).reshape(m.values.shape))
@@ -35,7 +36,7 @@ def redrawn(
     prediction = replace(
         equations.prediction, table=replace(equations.table, sets=sets), parameters=parameters
     )
-    other = replace(equations, prediction=prediction, closures=closures)
-    if equations.closures.unknowns:
+    other = replace(equations, prediction=prediction, machines=machines)
+    if equations.machines.unknowns:
         return other, other.at(at.theta, noise, at)
     return other, replace(at, parameters=parameters, residuals=residuals, cache={})

@@ -14,7 +14,7 @@ import numpy as np
 from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.estimation.elimination import Elimination
 from pkmcal.estimation.pose_table import PoseTable
-from pkmcal.estimation.session_machines import SessionClosures
+from pkmcal.estimation.session_machines import Machines
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +114,7 @@ def row_blocks(table: PoseTable, unstated: BoolArray, missing: int) -> RowBlocks
 
 def pose_blocks(
     table: PoseTable,
-    closures: SessionClosures,
+    machines: Machines,
     slack: BoolArray,
     unstated: BoolArray,
     size: float,
@@ -124,14 +124,14 @@ def pose_blocks(
     `size` is the largest number that the equations are made of, mm.
     """
     counts = ~slack
-    if closures.missing is not None:
-        counts = counts & ~closures.missing
+    if machines.missing is not None:
+        counts = counts & ~machines.missing
     poses, pose_of_row = len(table.actuators), np.concatenate(table.pose_of)
-    groups = np.full(closures.equations, len(unstated) - 1)
-    groups[closures.equations - closures.cells :] -= 1  # load cells are one before the actuators
+    groups = np.full(machines.equations, len(unstated) - 1)
+    groups[machines.equations - machines.cells :] -= 1  # load cells are one before the actuators
     own, closure = np.nonzero(counts)
     pose_of_equation = np.concatenate([own, np.repeat(pose_of_row, table.count)])
-    elimination = Elimination(pose_of_equation, poses, closures.unknowns, size)
+    elimination = Elimination(pose_of_equation, poses, machines.unknowns, size)
     block_of_pose = np.full(poses, -1)
     block_of_pose[elimination.pose_of_block] = np.arange(len(elimination.pose_of_block))
     return PoseBlocks(

@@ -6,7 +6,7 @@ Where all numbers of the geometry are common to all sessions there is one machin
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TypeVar
 
@@ -14,13 +14,13 @@ import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray, lots
 from pkmcal.estimation.closures import Closures, ExactActuators, closures_of
+from pkmcal.estimation.pose_table import PoseTable
 from pkmcal.estimation.row_states import RowStates
 from pkmcal.estimation.sessions import by_parameters
-from pkmcal.estimation.tensioned_poses import Cells, tensioned_poses
+from pkmcal.estimation.tensioned_poses import tensioned_poses
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.kinematics.drive_state import DriveState
-from pkmcal.kinematics.robot import Robot
 
 AnyArray = TypeVar("AnyArray", FloatArray, Int32Array, BoolArray)
 
@@ -29,7 +29,7 @@ _TOGETHER = 8192  # poses whose derivatives are held at once
 
 @dataclass(frozen=True, eq=False)
 class Machines:
-    """The machines of a calibration.
+    """The machines of a calibration, and what their closures say of the poses.
 
     Attributes
     ----------
@@ -37,13 +37,53 @@ class Machines:
         One, or one for each session.
     rows : tuple of ndarray of int
         The poses that are its own, of each.
+    closures : tuple of Closures
+        Of each.
     state : DriveState
-        From where the actuators came, and the tension of what they drive (K, n).
+        From where the actuators came, the tension of what they drive, and what was carried.
+    shift : ndarray (K, equations) or None
+        By how much whitened equations of the closures are larger: of other readings.
     """
 
     robots: tuple[Calibratable, ...]
     rows: tuple[IntArray, ...]
+    closures: tuple[Closures, ...]
     state: DriveState
+    shift: FloatArray | None = None
+
+    @property
+    def unknowns(self) -> int:
+        """Unknowns of each pose."""
+        return self.closures[0].unknowns
+
+    @property
+    def equations(self) -> int:
+        """Equations of the closures of each pose."""
+        return self.closures[0].equations
+
+    @property
+    def cells(self) -> int:
+        """How many of them are of load cells: the last ones."""
+        return self.closures[0].cells
+
+    @property
+    def actuators(self) -> tuple[int, ...]:
+        """The actuator that each equation has the reading of; -1: none."""
+        return self.closures[0].actuators
+
+    @property
+    def missing(self) -> BoolArray | None:
+        """Equations (K, equations) of load cells that were not read."""
+        found = [each.missing for each in self.closures if each.missing is not None]
+        return _joined(found, self.rows) if found else None
+
+    @property
+    def sigma(self) -> FloatArray | None:
+        """Standard deviations (K, equations) of the equations."""
+        found = [each.sigma for each in self.closures if each.sigma is not None]
+        return _joined(found, self.rows) if found else None
+
+    # the machines ---------------------------------------------------------------------------------
 
     @cached_property
     def driven(self) -> tuple[Calibratable, ...]:
@@ -73,135 +113,89 @@ class Machines:
             lambda robot, own: robot.actuator_twists(states.pose[own], states.actuators[own])
         )
 
+    # their closures -------------------------------------------------------------------------------
 
-class SessionClosures:
-    """What the closures of each session's machine say of its poses; see `Closures`.
+    def settled(self, states: RowStates) -> RowStates:
+        """The states near those of machines with other numbers."""
+        return self._states([each.settled(robot, own) for each, robot, own in self._each(states)])
 
-    Parameters
-    ----------
-    parts : sequence of Closures
-        Of each machine.
-    rows : sequence of ndarray of int
-        The poses that are its own.
-    shift : ndarray (K, equations), optional
-        By how much whitened equations are larger: of other readings.
-
-    Attributes
-    ----------
-    unknowns, equations : int
-        Of each pose, the same in all sessions.
-    actuators : tuple of int, equations
-        Whose reading each equation is of; -1 of none.
-    sigma : ndarray (K, equations) or None
-        Standard deviations of the equations.
-    missing : ndarray of bool (K, equations) or None
-        Those of load cells that were not read.
-    cells : int
-        How many of the equations are of load cells: the last ones.
-    """
-
-    def __init__(
-        self,
-        parts: Sequence[Closures],
-        rows: Sequence[IntArray],
-        shift: FloatArray | None = None,
-    ) -> None:
-        self._parts, self._rows, self._shift = tuple(parts), tuple(rows), shift
-        self.unknowns, self.equations = parts[0].unknowns, parts[0].equations
-        if any((p.unknowns, p.equations) != (self.unknowns, self.equations) for p in parts):
-            raise ArgumentError(
-                "measurements: state actuator_sigma of the same actuators in all sessions"
-            )
-        self.actuators, self.cells = parts[0].actuators, parts[0].cells
-        missing = [part.missing for part in parts if part.missing is not None]
-        self.missing = _joined(missing, self._rows) if missing else None
-        stated = [part.sigma for part in parts if part.sigma is not None]
-        self.sigma = _joined(stated, self._rows) if stated else None
-
-    def settled(self, machines: Machines, states: RowStates) -> RowStates:
-        """The states of machines with other numbers, near those given."""
-        return self._states([
-            part.settled(robot, own) for part, robot, own in self._each(machines, states)
-        ])  # fmt: skip
-
-    def moved(self, machines: Machines, states: RowStates, step: FloatArray) -> RowStates:
+    def moved(self, states: RowStates, step: FloatArray) -> RowStates:
         """States after steps (K, unknowns) of the unknowns."""
-        steps = _apart(step, self._rows)
+        steps = _apart(step, self.rows)
         return self._states([
-            part.moved(robot, own, mine)
-            for (part, robot, own), mine in zip(self._each(machines, states), steps, strict=True)
+            each.moved(robot, own, mine)
+            for (each, robot, own), mine in zip(self._each(states), steps, strict=True)
         ])  # fmt: skip
 
-    def residual(self, machines: Machines, states: RowStates) -> tuple[FloatArray, FloatArray]:
+    def residual(self, states: RowStates) -> tuple[FloatArray, FloatArray]:
         """The equations (K, equations), whitened, and their derivative by the unknowns."""
-        found = [part.residual(robot, own) for part, robot, own in self._each(machines, states)]
+        found = [each.residual(robot, own) for each, robot, own in self._each(states)]
         off, by_unknown = zip(*found, strict=True)
-        whole = _joined(off, self._rows)
-        whole = whole if self._shift is None else whole + self._shift
-        return whole, _joined(by_unknown, self._rows)
+        whole = _joined(off, self.rows)
+        whole = whole if self.shift is None else whole + self.shift
+        return whole, _joined(by_unknown, self.rows)
 
-    def shifted(self, by: FloatArray) -> SessionClosures:
-        """The closures of other readings: whitened equations (K, equations) are larger."""
-        shift = by if self._shift is None else self._shift + by
-        return SessionClosures(self._parts, self._rows, shift)
+    def shifted(self, by: FloatArray) -> Machines:
+        """With closures of other readings: whitened equations (K, equations) are larger."""
+        return replace(self, shift=by if self.shift is None else self.shift + by)
 
-    def lengths(self, machines: Machines) -> FloatArray:
+    def lengths(self) -> FloatArray:
         """Factors (equations,) to mm of the equations times their sigma."""
-        return self._parts[0].lengths(machines.robots[0])
+        return self.closures[0].lengths(self.robots[0])
 
-    def twists(self, machines: Machines, states: RowStates) -> FloatArray:
+    def twists(self, states: RowStates) -> FloatArray:
         """How the platform moves with the unknowns: twists (K, 6, unknowns)."""
-        found = [part.twists(robot, own) for part, robot, own in self._each(machines, states)]
-        return _joined(found, self._rows)
+        found = [each.twists(robot, own) for each, robot, own in self._each(states)]
+        return _joined(found, self.rows)
 
     def by_numbers(
-        self, machines: Machines, states: RowStates, places: IntArray, columns: IntArray, size: int
+        self, states: RowStates, places: IntArray, columns: IntArray, size: int
     ) -> FloatArray:
         """Derivative of the equations by the parameters, (K, equations, size).
 
         `columns` (S, g) are the parameters that numbers of the geometry are, of each machine.
         """
-        found = [
-            part.by_numbers(robot, own, places) for part, robot, own in self._each(machines, states)
-        ]
-        nowhere = [np.zeros(len(rows), dtype=np.intp) for rows in self._rows]
+        found = [each.by_numbers(robot, own, places) for each, robot, own in self._each(states)]
         wide = [
-            by_parameters(part, columns[s : s + 1], rows, size)
-            for s, (part, rows) in enumerate(zip(found, nowhere, strict=True))
+            by_parameters(part, own[None], np.zeros(len(part), dtype=np.intp), size)
+            for part, own in zip(found, columns, strict=True)
         ]
-        return _joined(wide, self._rows)
+        return _joined(wide, self.rows)
 
     def twists_by_numbers(
-        self, machines: Machines, states: RowStates, places: IntArray, poses: IntArray
+        self, states: RowStates, places: IntArray, poses: IntArray
     ) -> Iterator[tuple[IntArray, FloatArray]]:
         """How the platform moves with numbers of its machine, unknowns held.
 
         Of distinct poses, all where they have unknowns: those of each machine, and their twists
         (b, 6, g). Nothing where it does not move.
         """
-        for part, robot, rows in zip(self._parts, machines.robots, self._rows, strict=True):
+        for each, robot, rows in zip(self.closures, self.robots, self.rows, strict=True):
             own = poses[rows.take(np.searchsorted(rows, poses), mode="clip") == poses]
-            driven = _driven(robot, machines.state.at(own))
-            found = part.twists_by_numbers(driven, _some(states, own), places)
+            driven = _driven(robot, self.state.at(own))
+            found = each.twists_by_numbers(driven, _some(states, own), places)
             if found is not None:
                 yield own, found
 
-    def _each(
-        self, machines: Machines, states: RowStates
-    ) -> list[tuple[Closures, Calibratable, RowStates]]:
-        own = [states] if len(self._rows) == 1 else [_some(states, rows) for rows in self._rows]
-        return list(zip(self._parts, machines.driven, own, strict=True))
+    def _each(self, states: RowStates) -> list[tuple[Closures, Calibratable, RowStates]]:
+        own = [states] if len(self.rows) == 1 else [_some(states, rows) for rows in self.rows]
+        return list(zip(self.closures, self.driven, own, strict=True))
 
     def _states(self, parts: Sequence[RowStates]) -> RowStates:
         if len(parts) == 1:
             return parts[0]
         tensions = [part.tension for part in parts if part.tension is not None]
         return RowStates(
-            _joined([part.pose for part in parts], self._rows),
-            _joined([part.actuators for part in parts], self._rows),
-            _joined([part.status for part in parts], self._rows),
-            None if not tensions else _joined(tensions, self._rows),
+            _joined([part.pose for part in parts], self.rows),
+            _joined([part.actuators for part in parts], self.rows),
+            _joined([part.status for part in parts], self.rows),
+            None if not tensions else _joined(tensions, self.rows),
         )
+
+    def with_exact_actuators(self, read: FloatArray) -> Machines:
+        """With poses that follow from what the actuators read (K, n)."""
+        exact = tuple(ExactActuators(each) for each in _apart(read, self.rows))
+        return replace(self, closures=exact, shift=None)
 
 
 def _lots(rows: IntArray) -> list[IntArray]:
@@ -209,33 +203,28 @@ def _lots(rows: IntArray) -> list[IntArray]:
 
 
 def _driven(robot: Calibratable, state: DriveState) -> Calibratable:
-    return state.of(robot) if isinstance(robot, Robot) else robot
+    return state.of(robot)
 
 
-def exact_closures(rows: Sequence[IntArray], read: FloatArray) -> SessionClosures:
-    """Poses that follow from what the actuators read."""
-    return SessionClosures([ExactActuators(each) for each in _apart(read, rows)], rows)
-
-
-def closures_of_sessions(
-    robot: Calibratable,
-    rows: Sequence[IntArray],
-    read: FloatArray,
-    sigma: FloatArray | None,
-    cells: Cells | None = None,
-) -> SessionClosures:
-    """What the closures say of poses at what the actuators read (K, n); see `closures_of`.
-
-    `cells` are what load cells read there, where tensions are unknown.
-    """
+def machines_of(robot: Calibratable, table: PoseTable) -> Machines:
+    """The machine of each session at the present numbers, with its closures; see `closures_of`."""
+    rows = table.poses_of_machine
+    sigma, cells = table.actuator_sigma, table.cells
     sigmas = [None] * len(rows) if sigma is None else _apart(sigma, rows)
-    pairs = zip(_apart(read, rows), sigmas, strict=True)
+    pairs = zip(_apart(table.actuators, rows), sigmas, strict=True)
+    closures: tuple[Closures, ...]
     if cells is None:
-        return SessionClosures([closures_of(robot, *pair) for pair in pairs], rows)
-    parts = [
-        tensioned_poses(robot, *pair, cells.of(own)) for pair, own in zip(pairs, rows, strict=True)
-    ]
-    return SessionClosures(parts, rows)
+        closures = tuple(closures_of(robot, *pair) for pair in pairs)
+    else:
+        closures = tuple(
+            tensioned_poses(robot, *pair, cells.of(own))
+            for pair, own in zip(pairs, rows, strict=True)
+        )
+    if len({(each.unknowns, each.equations) for each in closures}) > 1:
+        raise ArgumentError(
+            "measurements: state actuator_sigma of the same actuators in all sessions"
+        )
+    return Machines((robot,) * len(rows), rows, closures, table.state)
 
 
 def _apart(whole: FloatArray, rows: Sequence[IntArray]) -> list[FloatArray]:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, IntArray
+from pkmcal.estimation.coarse_readings import Coarse, coarse_readings, component_of
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.estimate import Estimate
 from pkmcal.estimation.estimator import FEW, Estimator
@@ -25,16 +26,14 @@ from pkmcal.statistics.variance_components import told_apart, variance_component
 _ROUNDED = 1e3  # times rounding errors, below which residuals are nothing else
 
 
-def stated_variances(measured: Measurements) -> FloatArray | None:
-    """Mean variance of the lengths of each row (N,), mm², as sigma says; None where it does not.
-
-    Where angles alone were read theirs, rad².
-    """
+def stated_variances(measured: Measurements, family: int = 0) -> FloatArray | None:
+    """Mean variance of one family of each row (N,), in its unit, as sigma says; None without it."""
     sigma = measured.sigma
-    if sigma is None:
+    if sigma is None or not measured.instrument.families:
         return None
     squares = sigma**2 if sigma.ndim == 2 else np.diagonal(sigma, axis1=1, axis2=2)
-    means: FloatArray = squares[:, :3].mean(axis=1)
+    columns = measured.instrument.families[family].columns
+    means: FloatArray = squares[:, list(columns)].mean(axis=1)
     return means
 
 
@@ -60,6 +59,12 @@ class Uncertainty:
         `IterationState.noise`.
     slips : ndarray
         Of each set, `slipped`.
+    coarse : tuple of Coarse
+        Components whose residuals are no larger than the steps in which they were read.
+    considered : ndarray (p, k) or None
+        How the basis follows numbers that are not fitted along, in their stated deviations.
+    noise_share : float
+        Of the residuals' variance, what these numbers do not explain.
     """
 
     labels: Labels
@@ -70,6 +75,9 @@ class Uncertainty:
     equations: Equations
     factors: FloatArray
     slips: FloatArray
+    coarse: tuple[Coarse, ...]
+    considered: FloatArray | None = None
+    noise_share: float = 1.0
 
     @property
     def known(self) -> bool:
@@ -85,26 +93,41 @@ class Uncertainty:
     @property
     def mixed(self) -> bool:
         """Whether equations are mixtures of readings and closures; see `labels`."""
-        return bool(self.equations.closures.unknowns)
+        return bool(self.equations.machines.unknowns)
 
     @cached_property
     def matrix(self) -> FloatArray:
         """Covariance (n, n) of the reported parameters; inf where the noise is not known."""
         if not self.known:
             return np.full((len(self.reported),) * 2, np.inf)
-        return self.covariance.of(self.reported)
+        return self.covariance.of(self.reported) + self._beside(self.reported)
 
     @cached_property
     def scaled(self) -> FloatArray:
         """Covariance (n, n) of the scaled parameters."""
-        return self.covariance.of(self.fit.back)
+        return self.covariance.of(self.fit.back) + self._beside(self.fit.back)
+
+    def _beside(self, contrasts: FloatArray) -> FloatArray | float:
+        """What numbers that are not fitted along add to the covariance of contrasts (q, p)."""
+        if self.considered is None:
+            return 0.0
+        follow = contrasts @ self.considered
+        added: FloatArray = follow @ follow.T
+        return added
 
     @cached_property
     def freedom(self) -> FloatArray:
         """Degrees of freedom (n,) of the variances of the reported parameters."""
         if not self.known:
             return np.zeros(len(self.reported))
-        return self.covariance.freedom(self.reported)
+        own = self.covariance.freedom(self.reported)
+        if self.considered is None:
+            return own
+        data = np.diagonal(self.covariance.of(self.reported))
+        known = ((self.reported @ self.considered) ** 2).sum(axis=1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            widened: FloatArray = own * (1.0 + known / data) ** 2  # what is stated is known
+        return np.where(data > 0.0, widened, own)
 
     @property
     def poses(self) -> IntArray:
@@ -115,19 +138,19 @@ class Uncertainty:
     def by_cluster(self) -> FloatArray:
         """Covariance (p, p) in the basis that allows for whatever rows of a pose share."""
         prior = self.fit.prior.T @ self.fit.prior
-        matrix: FloatArray = self.covariance.sandwich.data + prior
+        matrix: FloatArray = self.covariance.by_cluster * self.noise_share + prior
         return matrix
 
     def in_units(self, whitened: FloatArray) -> FloatArray:
-        """Whitened values (M,) in mm and rad; where angles alone were read, their arcs in mm."""
+        """Whitened values (M,) in mm, angles as their arcs."""
         parts = self.equations.whitening.unwhiten(whitened, self.factors)
         arcs = self.equations.arcs
-        every = [arc * part.ravel() for arc, part in zip(arcs, parts, strict=True)]
+        every = [(arc * part).ravel() for arc, part in zip(arcs, parts, strict=True)]
         return np.concatenate(every)[self.equations.whitening.present]
 
     @cached_property
     def adjusted(self) -> FloatArray:
-        """Residuals (M,) with the variance of the errors, mm and rad."""
+        """Residuals (M,) with the variance of the errors, mm."""
         return self.in_units(self.covariance.sandwich.residual)
 
     def lengths_of(self, i: int) -> BoolArray:
@@ -135,10 +158,32 @@ class Uncertainty:
         chosen: BoolArray = self.labels.length & (self.labels.set_of == i)
         return chosen
 
+    def family_of(self, i: int, family: int) -> BoolArray:
+        """Equations (M,) of one family of set `i`, by its number there."""
+        columns = self.equations.table.sets[i].instrument.families[family].columns
+        mine: BoolArray = (self.labels.set_of == i) & np.isin(self._place, columns)
+        return mine
+
+    @cached_property
+    def _place(self) -> IntArray:
+        """Which component of its row each equation is (M,)."""
+        return component_of(self.equations)
+
     @cached_property
     def noises(self) -> tuple[Noise, ...]:
         """Variances in mm² of a length of each set; NaN where nothing shows them."""
-        return tuple(self._noise(i) for i in range(len(self.equations.table.sets)))
+        return tuple(self.noise_of(i) for i in range(len(self.equations.table.sets)))
+
+    def _rounding(self, i: int, family: int) -> float:
+        """The largest variance that rounding alone gives one family of set `i`, mm²."""
+        columns = self.equations.table.sets[i].instrument.families[family].columns
+        arcs = self.equations.arcs[i]
+        floors = [
+            float(arcs[each.component]) * each.floor
+            for each in self.coarse
+            if each.set == i and each.component in columns
+        ]
+        return max(floors, default=0.0) ** 2
 
     @cached_property
     def excess(self) -> Noise:
@@ -148,22 +193,33 @@ class Uncertainty:
             return noise(sandwich.residual, sandwich.retained, self.fit.key)
         return 1.0, 0.0
 
-    def _noise(self, i: int) -> Noise:
-        stated = self.stated_variances(i)
+    def noise_of(self, i: int, family: int = 0) -> Noise:
+        """Variances in mm² of one family of set `i`; NaN where nothing shows them."""
+        total, shared = self._noise(i, family)
+        return total * self.noise_share, shared * self.noise_share
+
+    def _noise(self, i: int, family: int) -> Noise:
+        stated = self.stated_variances(i, family)
         if self.mixed:
             own = float(self.factors[i] ** 2 if stated is None else stated.mean())
             shown = self.equations.table.sets[i].components and not self.unknown[i]
             return own * self.excess[0] if shown else float("nan"), 0.0
         if stated is not None and self.fit.freedom < FEW:
             return float(stated.mean()), 0.0
-        mine = self.lengths_of(i)
+        mine = self.family_of(i, family) if family else self.lengths_of(i)
         retained = self.covariance.sandwich.retained[mine]
-        return noise(self.adjusted[mine], retained, numbered(self.fit.key[mine]))
+        total, shared = noise(self.adjusted[mine], retained, numbered(self.fit.key[mine]))
+        return max(total, self._rounding(i, family)), shared
 
-    def stated_variances(self, i: int) -> FloatArray | None:
-        """`stated_variances` of set `i`, of angles that were read alone as arcs."""
-        stated = stated_variances(self.equations.table.sets[i])
-        return None if stated is None else self.equations.arcs[i] ** 2 * stated
+    def stated_variances(self, i: int, family: int = 0) -> FloatArray | None:
+        """`stated_variances` of set `i` in mm², of angles those of their arcs."""
+        m = self.equations.table.sets[i]
+        stated = stated_variances(m, family)
+        if stated is None:
+            return None
+        first = m.instrument.families[family].columns[0]
+        variances: FloatArray = self.equations.arcs[i][first] ** 2 * stated
+        return variances
 
     @cached_property
     def _repeated(self) -> IntArray:
@@ -213,7 +269,7 @@ def uncertainty(
     rates = chosen.reported_rates(estimate.evaluation.theta) * chosen.scale
     if (
         rule == "auto"
-        and equations.closures.unknowns
+        and equations.machines.unknowns
         and fit.clusters < len(equations.blocks.components)
     ):
         rule = "cluster"  # no two mixtures can be compared to see whether they share an error
@@ -223,21 +279,25 @@ def uncertainty(
     apart = None
     if classes is not None:
         apart = variance_components(fit, classes, _prior_residual(estimator, estimate))
+    found = covariance(
+        fit,
+        rule,
+        stated=not estimator.unstated.any(),
+        robust=estimator.loss != "linear",
+        components=apart,
+    )
+    coarse = coarse_readings(equations, named, fit, state.noise, found)
+    widening = max((each.widening for each in coarse), default=1.0)
     return Uncertainty(
         labels=named,
         fit=fit,
-        covariance=covariance(
-            fit,
-            rule,
-            stated=not estimator.unstated.any(),
-            robust=estimator.loss != "linear",
-            components=apart,
-        ),
+        covariance=found if widening == 1.0 else replace(found, widening=widening),
         reported=rates @ fit.back,
         unknown=estimator.unknown_noise(estimate),
         equations=equations,
         factors=state.noise,
         slips=slips,
+        coarse=coarse,
     )
 
 
@@ -285,7 +345,7 @@ def unlike_components(
     """
     equations = estimator.equations
     several = any(len(m.components) > 1 for m in equations.table.sets)
-    if equations.closures.unknowns:
+    if equations.machines.unknowns:
         return None
     if estimator.loss != "linear" or not estimator.unstated.all() or not several:
         return None

@@ -25,6 +25,9 @@ RESERVED = (
     "to",
     "touch",
     "temperature",
+    "payload",
+    "force",
+    "moment",
 )
 EULER = (("rx", "ry", "rz"), ("a", "b", "c"), ("w", "p", "r"))  # in the order of their letters
 VECTOR = ("rvx", "rvy", "rvz")
@@ -72,6 +75,7 @@ _SYNONYMS: dict[str, str] = {
     "temperature.base": "temp base|base temp|base temperature|temperature base",
     "temperature.platform": "temp platform|platform temp|platform temperature|temperature platform",
     "air temperature": "air temp|temperature air|ambient temperature|ambient temp|room temperature",
+    "payload": "load|load mass|payload mass|mass|carried",
     "probe": "probed|probed z|z probed|probe z|z probe|trigger z|z trigger|triggered|mesh|mesh z"
     "|bed mesh|bed z",
     "rx": "rot x|rotx|x rotation|euler x|angle x|actual rx",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NoReturn
 
@@ -108,6 +108,10 @@ class Table:
         if key not in self.data:
             self.fail("", f"the key {key!r} is missing")
         return self.data[key]
+
+    def flat(self) -> Iterator[tuple[str, Any]]:
+        """Pairs of dotted name and value: an unquoted ``base1.x`` is a table within a table."""
+        yield from _flat(self.data)
 
     # values -----------------------------------------------------------------------------------
 
@@ -218,3 +222,11 @@ def _reads_as_number(text: str) -> bool:
     except ValueError:
         return False
     return True
+
+
+def _flat(data: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    for key, value in data.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{prefix}{key}.")
+        else:
+            yield prefix + key, value

@@ -33,7 +33,9 @@ UNITS: dict[str, dict[str, tuple[float, float]]] = {
     "°C": {"°C": (1.0, 1.0)},
     "K": {"K": (1.0, 1.0)},
     "°F": {"°F": (1.0, 1.0)},
-    "N": {"N": (1.0, 1.0)},
+    "N": {"N": (1.0, 1.0), "kN": (1000.0, 1.0), "lbf": (4.4482216152605, 1.0)},
+    "N mm": {"N mm": (1.0, 1.0), "N m": (1000.0, 1.0), "Nmm": (1.0, 1.0), "Nm": (1000.0, 1.0)},
+    "kg": {"kg": (1.0, 1.0), "g": (1.0, 1000.0), "t": (1000.0, 1.0), "lb": (0.45359237, 1.0)},
     "count": {"steps": (1.0, 1.0), "counts": (1.0, 1.0), "rev": (1.0, 1.0)},
 }
 # Other spellings of units; a unit may also be in capitals.
@@ -54,7 +56,18 @@ SPELLINGS = {
     "ticks": "counts", "pulses": "counts",
 }  # fmt: skip
 _KNOWN = {unit for units in UNITS.values() for unit in units}
-_LETTERS = {"K", "k", "N", "n", "c", "f", '"', "'"}  # behind a name they may be a part of it
+_LETTERS = {
+    "K",
+    "k",
+    "N",
+    "n",
+    "c",
+    "f",
+    "g",
+    "t",
+    '"',
+    "'",
+}  # behind a name they may be a part of it
 
 
 def _pattern(without: Collection[str] = ()) -> str:

@@ -25,6 +25,7 @@ from pkmcal.kinematics.robot import Robot
 from pkmcal.kinematics.workspace import sample_poses
 from pkmcal.screw import from_pose
 from pkmcal.statistics.linear_fit import ROUNDING
+from pkmcal.statistics.singular_values import svd
 
 DATUM = "datum"  # the word that `fix` takes for them
 
@@ -192,14 +193,14 @@ def _still(twists: FloatArray, length: float, *frames: FloatArray) -> FloatArray
 
 def _basis(columns: FloatArray) -> FloatArray:
     """Orthonormal columns of the same space."""
-    left, singular, _ = np.linalg.svd(columns, full_matrices=False)
+    left, singular, _ = svd(columns)
     basis: FloatArray = left[:, singular > _OUTSIDE]
     return basis
 
 
 def _inside(own: FloatArray, space: FloatArray) -> FloatArray:
     """Orthonormal basis of what of one space lies in another; both by orthonormal columns."""
-    _, singular, rows = np.linalg.svd(own - space @ (space.T @ own), full_matrices=False)
+    _, singular, rows = svd(own - space @ (space.T @ own))
     inside: FloatArray = own @ rows[singular < _OUTSIDE].T
     return inside
 

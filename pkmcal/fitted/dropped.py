@@ -15,6 +15,7 @@ from pkmcal.estimation.estimate import Estimate
 from pkmcal.estimation.estimator import Estimator
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.fit_data import FitData
+from pkmcal.estimation.pose_minima import solved_in_least_minima
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.fitted.outliers import outliers
 
@@ -103,4 +104,6 @@ def robust_outliers(
 ) -> tuple[int, ...]:
     """Numbers of the rows that a robust fit from this start finds outlying."""
     estimator = estimator_at(equations, commanded, start, "cauchy")
-    return tuple(equations.table.rows[outlying(estimator, estimator.solve())].tolist())
+    return tuple(
+        equations.table.rows[outlying(estimator, solved_in_least_minima(estimator))].tolist()
+    )

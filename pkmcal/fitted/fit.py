@@ -2,19 +2,52 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray
+from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.estimate import Estimate
+from pkmcal.estimation.estimator import Estimator
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.identifiability import decompose
 from pkmcal.estimation.parameters import Parameters
-from pkmcal.estimation.uncertainty import Uncertainty
+from pkmcal.estimation.uncertainty import LinearModel, Uncertainty, solved, uncertainty
+from pkmcal.fitted.datum import NO_DATUM, Datum
+from pkmcal.fitted.held_numbers import with_considered
+from pkmcal.fitted.slack import Cell
+from pkmcal.statistics.covariance import CovarianceRule
 
 _LEAST = 1e-6  # share of a combination that is more than rounding
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Equations to be solved.
+
+    Attributes
+    ----------
+    equations : Equations
+        Of the fitted rows.
+    exact : Equations
+        With poses that follow from the actuators exactly; the same ones where poses have no
+        unknowns.
+    start : Evaluation
+        Where these begin: at the nominal machine, unknown frames aligned with the readings.
+    slack : tuple of Cell
+        Readings of slack cables that are left out.
+    """
+
+    equations: Equations
+    exact: Equations
+    start: Evaluation
+    slack: tuple[Cell, ...] = ()
+
+    def of(self, equations: Equations) -> Problem:
+        """Other equations, from the same start."""
+        return replace(self, equations=equations, exact=equations.with_exact_actuators())
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,23 +56,60 @@ class Fit:
 
     Attributes
     ----------
-    equations : Equations
-        The residual equations of the fitted rows, poses following from the actuators.
-    start, end : Evaluation
-        They at the nominal machine, an unknown frame aligned with the readings, and at the
-        solution.
+    problem : Problem
+        What was solved.
+    estimator : Estimator
+        The search for it.
     estimate : Estimate
         What was fitted at the solution, with its statistics. On machines where every row has a
         pose of its own the residual equations there are those that are left of all.
-    uncertainty : Uncertainty
-        How sure it is; `Uncertainty.equations` are those that were fitted.
+    datum : Datum
+        Numbers that are held because they only say where frames lie.
+    classes : ndarray of int (M,) or None
+        Classes of equations whose noise was told apart.
+    rule : {"auto", "classical", "cluster"}
+        Whether rows of a pose are taken to share errors.
     """
 
-    equations: Equations
-    start: Evaluation
-    end: Evaluation
+    problem: Problem
+    estimator: Estimator
     estimate: Estimate
-    uncertainty: Uncertainty
+    datum: Datum = NO_DATUM
+    classes: IntArray | None = None
+    rule: CovarianceRule = "auto"
+
+    @property
+    def start(self) -> Evaluation:
+        """The equations at the nominal machine, an unknown frame aligned with the readings."""
+        return self.problem.start
+
+    @cached_property
+    def equations(self) -> Equations:
+        """The residual equations of the fitted rows, poses following from the actuators."""
+        exact = self.problem.exact
+        if exact is self.estimator.equations:
+            return exact
+        return exact.with_tension(self.estimate.evaluation.states.tension)
+
+    @cached_property
+    def end(self) -> Evaluation:
+        """These equations at the solution."""
+        solution = self.estimate.evaluation
+        if self.equations is self.estimator.equations:
+            return solution
+        return self.equations.at(solution.theta, near=solution)
+
+    @cached_property
+    def linear(self) -> LinearModel:
+        """The linear model at the solution."""
+        return solved(self.estimator, self.estimate)
+
+    @cached_property
+    def uncertainty(self) -> Uncertainty:
+        """How sure the numbers are; `Uncertainty.equations` are those that were fitted."""
+        sure = uncertainty(self.estimator, self.estimate, self.linear, self.rule, self.classes)
+        stated = self.estimator.equations.parameters.asked.uncertainty
+        return with_considered(sure, self.estimate.evaluation, stated)
 
     @property
     def covariance(self) -> FloatArray:
@@ -68,5 +138,7 @@ class Fit:
         Of the measurements alone, whatever a prior says.
         """
         basis = self.estimate.state.measured.identifiable
-        along = np.linalg.svd(basis[self.parameters.geometry.stop :], compute_uv=False)
+        chosen = self.parameters
+        beside = np.arange(len(chosen)) >= chosen.geometry.stop
+        along = np.linalg.svd(basis[beside | chosen.uncertain], compute_uv=False)
         return int(basis.shape[1] - np.count_nonzero(along > _LEAST))

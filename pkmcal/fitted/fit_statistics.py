@@ -22,6 +22,8 @@ from pkmcal.estimation.mirror import MIRROR, mirror_fits
 from pkmcal.estimation.uncertainty import Uncertainty
 from pkmcal.fitted.distances import distances
 from pkmcal.fitted.dropped import outlying
+from pkmcal.fitted.nuisances import in_result, nuisances
+from pkmcal.kinematics.robot import Robot
 from pkmcal.statistics.distributions import t_factor
 from pkmcal.statistics.linear_fit import triangle
 from pkmcal.statistics.prior_test import LEAST_FREEDOM, PriorTest, data_alone, prior_test
@@ -50,18 +52,23 @@ def parameter_table(
     at_bound = np.zeros(len(chosen), dtype=bool)
     for bound in chosen.bounds:
         at_bound |= np.isclose(theta, bound, rtol=1e-9, atol=1e-9)
+    beside = nuisances(chosen, theta, values, rates @ estimate.covariance @ rates.T)
+    mine = np.flatnonzero(in_result(chosen, beside))
+    known = np.isfinite(stderr[mine])
     return {
-        "free": chosen.names,
-        "units": chosen.units,
-        "values": values,
-        "start": chosen.reported(estimator.start.theta),
-        "stderr": stderr,
-        "parameter_dof": freedom,
-        "interval95": np.column_stack([values - half, values + half]),
-        "covariance": shown,
+        "free": tuple(chosen.names[i] for i in mine),
+        "units": tuple(chosen.units[i] for i in mine),
+        "columns": mine,
+        "values": values[mine],
+        "start": chosen.reported(estimator.start.theta)[mine],
+        "stderr": stderr[mine],
+        "parameter_dof": freedom[mine],
+        "interval95": np.column_stack([values - half, values + half])[mine],
+        "covariance": shown[np.ix_(mine, mine)],
         "correlation_matrix": _correlation(
-            rates @ estimate.covariance @ rates.T, np.isfinite(stderr)
+            (rates @ estimate.covariance @ rates.T)[np.ix_(mine, mine)], known
         ),
+        "nuisances": beside,
         "at_bounds": tuple(name for name, at in zip(chosen.names, at_bound, strict=True) if at),
         "covariance_rule": uncertainty.covariance.rule,
     }
@@ -75,13 +82,14 @@ def _correlation(covariance: FloatArray, known: BoolArray) -> FloatArray:
     return matrix
 
 
-def identifiability(estimator: Estimator, estimate: Estimate) -> dict[str, Any]:
-    """What the measurements alone determine."""
+def identifiability(estimator: Estimator, estimate: Estimate, hidden: int) -> dict[str, Any]:
+    """What the measurements alone determine; `hidden` parameters are no part of the result."""
     equations, measured = estimator.equations, estimate.state.measured
     chosen = equations.parameters
     names: tuple[str, ...] = ()
     rest = measured.unidentifiable
-    if equations.closures.unknowns:
+    yields = isinstance(chosen.robot, Robot) and chosen.robot.model.elastic is not None
+    if equations.machines.unknowns or yields:
         names, rest = gauges(chosen, rest)
         if len(estimate.prior):  # a tape on two anchors ends the scale, say
             names, _ = gauges(chosen, estimate.state.determined.unidentifiable)
@@ -89,7 +97,7 @@ def identifiability(estimator: Estimator, estimate: Estimate) -> dict[str, Any]:
         names = (*names, MIRROR)
     open_ones = sparse_basis(rest, chosen.names).T
     return {
-        "rank": measured.rank,
+        "rank": measured.rank - hidden,
         "gap": measured.gap,
         "unidentifiable": tuple(
             as_sum(combination, chosen.names, chosen.units, chosen.scale)
@@ -135,8 +143,8 @@ def misfit(
         "closure_rms": misfits.closure_rms(equations, estimate.evaluation),
         "closure_rms_before": misfits.closure_rms(equations, estimator.start),
         "closures": misfits.worst_closures(equations, estimate.evaluation),
-        "actuator_noise": float(shown[-1]) if equations.closures.unknowns else float("nan"),
-        "tension_noise": float(shown[-2]) if equations.closures.cells else float("nan"),
+        "actuator_noise": float(shown[-1]) if equations.machines.unknowns else float("nan"),
+        "tension_noise": float(shown[-2]) if equations.machines.cells else float("nan"),
         "tension_rms": misfits.cell_rms(equations, estimate.evaluation),
         "redundancy": tuple(estimate.freedom.tolist()),
         "idle": equations.blocks.uninformative,
@@ -166,19 +174,27 @@ def repeats(uncertainty: Uncertainty) -> dict[str, Any]:
     }
 
 
-def tested_prior(estimator: Estimator, estimate: Estimate) -> PriorTest | None:
+def tested_prior(
+    estimator: Estimator, estimate: Estimate, *, of_uncertain: bool = False
+) -> PriorTest | None:
     """Whether the measurements contradict the prior; None without one, or where nothing can tell.
 
-    A robust fit's prior is not tested.
+    Or, `of_uncertain`, the stated uncertainty of numbers that were fitted along. What is known
+    otherwise is an equation like the measurements. A robust fit's prior is not tested.
     """
     chosen = estimator.equations.parameters
-    rows = estimate.prior
+    mine = np.zeros(len(estimate.prior), dtype=bool)
+    mine[chosen.prior_of_uncertain] = True
+    mine = mine if of_uncertain else ~mine
+    rows, others = estimate.prior[mine], estimate.prior[~mine]
     if not len(rows) or np.linalg.matrix_rank(rows) < len(rows) or estimator.loss != "linear":
         return None
     # parameters as what the prior says of them, in its deviations, and the rest
     known = np.asarray(np.linalg.pinv(rows), dtype=np.float64)
     rest = np.linalg.svd(rows)[2][len(rows) :].T
-    data = estimate.residual - estimate.change(known @ chosen.prior_left(estimate.evaluation.theta))
+    left = chosen.prior_left(estimate.evaluation.theta)
+    centre = known @ left[mine]
+    data = estimate.residual - estimate.change(centre)
     variance, freedom = 1.0, np.inf
     if estimator.unstated.any():
         squares, freedom = data_alone(estimate.design, data)
@@ -186,6 +202,12 @@ def tested_prior(estimator: Estimator, estimate: Estimate) -> PriorTest | None:
             return None
         variance = squares / freedom
     columns = [estimate.change(known), estimate.change(rest), data]
+    if len(others):
+        beside = [others @ known, others @ rest, left[~mine] - others @ centre]
+        sigma = np.sqrt(variance)
+        columns = [
+            np.concatenate([own, sigma * more]) for own, more in zip(columns, beside, strict=True)
+        ]
     factor = triangle(columns)
     k = len(rows)
     return prior_test(factor[:, :k], factor[:, k:-1], factor[:, -1], variance, freedom)

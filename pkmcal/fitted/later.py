@@ -21,6 +21,7 @@ from pkmcal.estimation.least_squares import Search
 from pkmcal.estimation.loss import Loss
 from pkmcal.estimation.mode_slips import in_their_modes, start_in_modes
 from pkmcal.estimation.parameters import Parameters
+from pkmcal.estimation.pose_minima import in_least_minima
 from pkmcal.estimation.row_states import RowStates
 from pkmcal.estimation.sessions import NONE
 from pkmcal.estimation.uncertainty import Uncertainty
@@ -136,6 +137,9 @@ def compared(
     """
     commanded, theta = whole.with_exact_actuators(), rows.at(estimate.evaluation.theta)
     if not rows.own.any():
+        if whole.system is not None:
+            noise = noise_factors(rows, whole, sure)
+            near = in_least_minima(whole, whole.at(theta, noise, near), noise).onward
         return commanded, in_their_modes(commanded, commanded.at(theta, near=near)), None
     whole, start = whole.begin(start_in_modes(commanded, theta, rows.own, near))
     found, own = _own_numbers(rows, whole, start, estimate, sure)

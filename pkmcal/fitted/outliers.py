@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, IntArray, first_largest, lots
+from pkmcal.arrays import FloatArray, IntArray, largest_first, lots
 from pkmcal.statistics.robust_scale import median_ratio
 
 _FALSE_ALARM = 0.01  # chance of naming any row at all where the noise is as stated
@@ -12,6 +12,9 @@ _ALIKE = 1e-9  # share by which rows are further off than others that are not eq
 _NONE = np.finfo(float).tiny
 _MOST = 4  # at most one row in so many can be odd
 _TOGETHER = 4096  # rows that are looked at at once, to bound memory
+_AT_ONCE = 1000  # of so many rows one is set aside at a time
+_AS_ODD = 0.5  # of the worst row's excess, from which others are set aside with it
+_OWN = 0.1  # share of itself that such a row decides at most: no other can move it as far
 
 
 def outliers(
@@ -24,7 +27,8 @@ def outliers(
     """Rows further off than noise explains, by their residuals in a fit without them.
 
     The row that the rest contradicts most is set aside, the fit is corrected to first order, and
-    so on until what is left agrees; then rows that fit the corrected fit after all return.
+    so on until what is left agrees; then rows that fit the corrected fit after all return. Of very
+    many rows some are set aside together: such as no other one can have moved so far.
 
     Parameters
     ----------
@@ -56,7 +60,7 @@ def outliers(
     weight = np.repeat(weights, components)
     pull = jacobian.T @ (weight * residual)  # of the prior: at the solution the two balance
     kept = np.ones(rows, dtype=bool)
-    for _ in range(rows // _MOST + 1):
+    while True:
         used = np.where(np.repeat(kept, components), weight, 0.0)
         normal = prior.T @ prior
         for lot in lots(len(residual)):
@@ -66,31 +70,49 @@ def outliers(
         shift = covariance @ (jacobian.T @ (used * residual) - pull)
         left = residual - jacobian @ shift
         part = np.where(kept, -weights, 1.0)  # a fitted row has pulled the fit to itself
-        squares = np.empty(rows)
+        squares, own = np.empty((2, rows))
         for mine in alike:
             e = first[mine, None] + np.arange(components[mine[0]])
-            squares[mine] = _squares(left[e], jacobian[e], covariance, part[mine])
+            squares[mine], own[mine] = _squares(left[e], jacobian[e], covariance, part[mine])
         spread = median_ratio(squares[kept], components[kept])
         chance = _chance(squares / max(spread, 1.0), components)
         # where the chance is 0 to the last digit, the squares decide; they exceed its logarithm
         excess = np.where(chance > 0, -np.log(np.maximum(chance, _NONE)), squares)
         excess = np.where(kept, np.maximum(excess, 0.0), -1.0)
-        worst = first_largest(excess, _ALIKE * float(excess.max()))
-        if chance[worst] >= _FALSE_ALARM / rows:
-            break
+        allowed = rows // _MOST + 1 - np.count_nonzero(~kept)
+        worst = _worst(excess, own, min(max(rows // _AT_ONCE, 1), allowed))
+        worst = worst[chance[worst] < _FALSE_ALARM / rows]
         kept[worst] = False
+        if len(worst) in (0, allowed):
+            break
     odd: IntArray = np.flatnonzero(~kept & (chance < _FALSE_ALARM / rows))
     return odd
 
 
-def _squares(r: FloatArray, j: FloatArray, covariance: FloatArray, part: FloatArray) -> FloatArray:
-    """Squared length of residuals (N, k) in units of their own deviations, (N,)."""
+def _worst(excess: FloatArray, own: FloatArray, most: int) -> IntArray:
+    """The row with the largest excess, and at most so many in all that are about as odd.
+
+    Rows that decide more of themselves, `own`, may be off by the error of another: not those.
+    """
+    largest = float(excess.max())
+    some = np.flatnonzero(excess >= _AS_ODD * largest)
+    order = some[largest_first(excess[some], _ALIKE * largest)]
+    return np.concatenate([order[:1], order[1:][own[order[1:]] < _OWN]])[:most]
+
+
+def _squares(
+    r: FloatArray, j: FloatArray, covariance: FloatArray, part: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Squared length of residuals (N, k) in units of their own deviations, (N,).
+
+    Then the share of itself that each row decides, in the component in which it is most.
+    """
     variance = np.eye(r.shape[1]) + part[:, None, None] * (j @ covariance @ j.transpose(0, 2, 1))
     values, vectors = np.linalg.eigh(variance)
     along = (vectors.transpose(0, 2, 1) @ r[:, :, None])[:, :, 0]
     seen = values > 1e-6  # a row that the fit follows wherever it lies says nothing
     squares: FloatArray = np.where(seen, along**2 / np.where(seen, values, 1.0), 0.0).sum(axis=1)
-    return squares
+    return squares, 1.0 - values[:, 0]
 
 
 def _chance(squares: FloatArray, components: IntArray) -> FloatArray:

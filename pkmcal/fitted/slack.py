@@ -19,6 +19,7 @@ from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.estimate import Estimate
 from pkmcal.estimation.estimator import Estimator
 from pkmcal.estimation.evaluation import Evaluation
+from pkmcal.estimation.pose_minima import in_least_minima, solved_in_least_minima, squares_of_poses
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.kinematics.calibratable import Calibratable
@@ -116,27 +117,19 @@ def _without_each(
     slack moves them far; the geometry is held.
     """
     evaluation, noise = estimate.evaluation, estimate.state.noise
-    before = _squares(equations, evaluation, noise)[poses]
-    shape = (len(poses), equations.closures.equations)
+    before = squares_of_poses(equations, evaluation, noise)[poses]
+    shape = (len(poses), equations.machines.equations)
     gain, longer = np.zeros(shape), np.zeros(shape)
     for k in range(shape[1]):
         cells = [(pose, k) for pose in poses.tolist()]
         other = equations.without_closures([*equations.slack_cells, *cells], evaluation)
-        there = other.at(evaluation.theta, noise, evaluation)
+        there = in_least_minima(other, other.at(evaluation.theta, noise, evaluation), noise)
         gain[:, k] = np.where(
-            there.status[poses] == 0, before - _squares(other, there, noise)[poses], 0.0
+            there.status[poses] == 0, before - squares_of_poses(other, there, noise)[poses], 0.0
         )
-        off, _ = other.closures.residual(there.machines, there.states)
+        off, _ = there.machines.residual(there.states)
         longer[:, k] = -off[poses, k]
     return gain, longer * np.sign(_slopes(equations, evaluation))[poses]
-
-
-def _squares(equations: Equations, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
-    """Squared residuals of each pose (K,)."""
-    found = np.zeros(len(equations.table.actuators))
-    blocks = equations.blocks
-    found[blocks.pose_of_block] = blocks.squares(equations.residual(evaluation, noise))
-    return found
 
 
 def taut(
@@ -148,7 +141,7 @@ def taut(
     the way is taut after all.
     """
     cells: dict[tuple[int, int], Cell] = {}
-    if equations.closures.cells:
+    if equations.machines.cells:
         raise ArgumentError(
             "slack: cables are not looked at for slack where their tensions are unknown"
         )
@@ -156,7 +149,7 @@ def taut(
         return equations, ()
     for k in range(_ROUNDS):
         estimator = estimator_at(equations, commanded, start, "cauchy")
-        estimate = estimator.solve()
+        estimate = solved_in_least_minima(estimator)
         longer, _ = _longer(equations, estimate)
         kept = {key: cell for key, cell in cells.items() if longer[key] > -_TOO_SHORT}
         more = _slack_cells(estimator, estimate)
@@ -193,7 +186,7 @@ def slack_cables(
     there = without.at(evaluation.theta, estimate.state.noise, evaluation)
     assert without.system is not None
     off = -without.system.readings_off(there) * _slopes(equations, there)
-    pose_of, actuator = np.concatenate(equations.table.pose_of), equations.closures.actuators
+    pose_of, actuator = np.concatenate(equations.table.pose_of), equations.machines.actuators
     cables = [
         SlackCable(
             tuple(equations.table.rows[pose_of == cell.pose].tolist()),
@@ -215,7 +208,7 @@ def _pulling(equations: Equations) -> BoolArray:
     """Which closures are of a cable, (equations,)."""
     robot = equations.parameters.robot
     if not isinstance(robot, Robot) or robot.model.chains is not None:
-        return np.zeros(equations.closures.equations, dtype=bool)
+        return np.zeros(equations.machines.equations, dtype=bool)
     home = robot.inverse(robot.home)[None]
     slope = robot.machine.slopes(robot.slots, home)[0]
     cables = np.array([KINDS[limb.kind].cable for limb in robot.model.limbs])
@@ -224,12 +217,12 @@ def _pulling(equations: Equations) -> BoolArray:
         bool(cables[mine].all()) and abs(np.sign(slope[mine]).sum()) == mine.sum()
         for mine in (of_limbs == a for a in range(robot.n_actuators))
     ]  # an actuator that lets one cable out and takes another in says nothing by its sign
-    return np.array([a >= 0 and pulling[a] for a in equations.closures.actuators], dtype=bool)
+    return np.array([a >= 0 and pulling[a] for a in equations.machines.actuators], dtype=bool)
 
 
 def _slopes(equations: Equations, evaluation: Evaluation) -> FloatArray:
     """By how much cables lengthen with what is read (K, equations), negative for reversed ones."""
-    actuators = equations.closures.actuators
+    actuators = equations.machines.actuators
 
     def slopes(robot: Calibratable, poses: IntArray) -> FloatArray:
         found = np.ones((len(poses), len(actuators)))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any, Generic
 
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import BoolArray, FloatArray, IntArray
@@ -13,15 +13,26 @@ from pkmcal.fitted.datum import NO_DATUM, Datum
 from pkmcal.fitted.distances import Distances
 from pkmcal.fitted.fit import Fit
 from pkmcal.fitted.holdout import HeldOut
+from pkmcal.fitted.nuisances import Nuisance
 from pkmcal.fitted.slack import SlackCable
 from pkmcal.kinematics.robot import Robot
 from pkmcal.statistics.prior_test import PriorTest
 
+if TYPE_CHECKING:  # which brings its own; the module is of Python 3.13 and later
+    from typing_extensions import TypeVar
+
+    Machine = TypeVar("Machine", bound=Robot | SerialArm, default=Robot | SerialArm, covariant=True)
+else:
+    from typing import TypeVar
+
+    Machine = TypeVar("Machine")  # what `identify` was given
+
 _NAMES = (  # of `to_dict`, in the order in which they are written
     "verdict", "robot", "free", "units", "values", "start", "stderr", "parameter_dof", "interval95",
     "covariance", "covariance_rule", "rank", "gap", "datum", "expansion", "unidentifiable",
-    "gauges", "rms", "rms_before", "holdout_rms", "holdout_rms_before", "holdout_expected",
-    "holdout_contradicts", "holdout_chance", "holdout_outliers", "holdout_unreached", "holdout_off",
+    "nuisances", "gauges", "rms", "rms_before", "holdout_rms", "holdout_rms_before",
+    "holdout_expected", "holdout_contradicts", "holdout_chance", "holdout_outliers",
+    "holdout_unreached", "holdout_off",
     "holdout_off_before", "closure_rms", "closure_rms_before", "chi2_per_dof", "dof", "noise",
     "component_noise", "reading_noise", "pose_noise", "actuator_noise", "tension_noise",
     "tension_rms", "redundancy", "idle", "repeatability", "lack_of_fit", "lack_of_fit_chance",
@@ -33,7 +44,7 @@ _NAMES = (  # of `to_dict`, in the order in which they are written
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Solution(HeldOut):
+class Solution(HeldOut, Generic[Machine]):
     """A solved calibration: every number that was found, each under one name.
 
     Those of points that were not fitted are described in the base class, `HeldOut`.
@@ -44,6 +55,11 @@ class Solution(HeldOut):
         Names (n,): numbers of the geometry, then of an unknown frame and unknown targets.
     units : tuple of str
         Unit of each parameter: "mm", "rad" or "1" (a ratio).
+    columns : ndarray of int
+        Which parameters (n,) of the fit they are: it may have had others, `nuisances`.
+    nuisances : tuple of Nuisance
+        Numbers that were fitted along because their uncertainty is stated. Those that moved by
+        more than twice that are in `free`, too.
     values : ndarray
         Identified values (n,).
     start : ndarray
@@ -166,6 +182,8 @@ class Solution(HeldOut):
         Misfit rms in mm at the start and after each step of the search.
     prior_test : PriorTest or None
         Whether the measurements contradict the prior, where there is one.
+    uncertainty_test : PriorTest or None
+        Whether they contradict the stated uncertainty of `nuisances`, where there are any.
     robots : mapping of str to Robot or SerialArm
         The machine of each session, those that were held out too; empty without `per_session`.
     datum : Datum
@@ -181,6 +199,8 @@ class Solution(HeldOut):
 
     free: tuple[str, ...]
     units: tuple[str, ...]
+    columns: IntArray
+    nuisances: tuple[Nuisance, ...]
     values: FloatArray
     start: FloatArray
     stderr: FloatArray
@@ -221,13 +241,14 @@ class Solution(HeldOut):
     repeatability: float
     lack_of_fit: float
     lack_of_fit_chance: float
-    robot: Robot | SerialArm
+    robot: Machine
     fit: Fit
     converged: bool
     evaluations: int
     history: tuple[float, ...]
     prior_test: PriorTest | None = None
-    robots: Mapping[str, Robot | SerialArm] = field(default_factory=dict)
+    uncertainty_test: PriorTest | None = None
+    robots: Mapping[str, Machine] = field(default_factory=dict)
     datum: Datum = NO_DATUM
     dropped: tuple[int, ...] = ()
     dropped_names: str = ""

@@ -52,6 +52,11 @@ class Load:
     def __post_init__(self) -> None:
         self.rows(None)
 
+    @classmethod
+    def of_rows(cls, rows: FloatArray) -> Load:
+        """The load of numbers (..., 10) in the order of `CARRIED`."""
+        return cls(rows[..., 0], rows[..., 1:4], rows[..., 4:7], rows[..., 7:10])
+
     def rows(self, shape: tuple[int, ...] | None) -> FloatArray:
         """The numbers in the order of `CARRIED`, (10,), or (N, 10) for a batch of this shape.
 

@@ -21,6 +21,7 @@ from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.laws import Law, drive
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.load import CableLoad
+from pkmcal.geometry.stated_uncertainty import NOTHING, StatedUncertainty
 
 CHAIN = "chain"  # the kind of a limb that is a chain of joints: see `pkmcal.geometry.chains`
 
@@ -163,6 +164,8 @@ class Model:
         The firmware from which the numbers were imported.
     elastic : Elastic or None
         What yields and what pulls at it; None of a rigid machine.
+    uncertainty : StatedUncertainty
+        How wrong numbers may be that a calibration does not look for.
     """
 
     name: str
@@ -183,6 +186,7 @@ class Model:
     probe: FloatArray | None = None
     controller: Controller | None = None
     elastic: Elastic | None = None
+    uncertainty: StatedUncertainty = NOTHING
 
     def __post_init__(self) -> None:
         if self.load is not None:  # some of its numbers may be those of the geometry

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -33,6 +33,7 @@ from pkmcal.geometry.robot_file_elastic import read_elastic
 from pkmcal.geometry.robot_file_laws import refuse_turning
 from pkmcal.geometry.robot_file_limbs import Limbs, Parameters, read_limbs
 from pkmcal.geometry.robot_file_writer import text_of
+from pkmcal.geometry.stated_uncertainty import read_uncertainty
 
 # What a data sheet states beside single numbers: of the circles of the joints, and of the legs at
 # home, which a machine with length limbs has.
@@ -40,7 +41,8 @@ STATED_SIZES = ("base_radius", "base_diameter", "platform_radius", "platform_dia
 INDEPENDENT = "independent"  # the default free set of a file that names none: found when loaded
 TOP = (
     "name", "units", "closure_tolerance", "frames", "pose", "workspace", "load", "probe",
-    "controller", "parameters", "calibration", "stated", "limb", "tail", *TOP_ELASTIC,
+    "controller", "parameters", "calibration", "uncertainty", "stated", "limb", "tail",
+    *TOP_ELASTIC,
 )  # fmt: skip
 
 
@@ -181,6 +183,7 @@ def parse(source: Source, file: str | None) -> Model:
         geometry=geometry,
         free=_read_free(_section(top, "calibration"), geometry),
         stated=_read_stated(_section(top, "stated"), geometry, limbs.limbs),
+        uncertainty=read_uncertainty(_section(top, "uncertainty"), geometry),
         base_frame=_read_pose(frames, "base", POSE) if "base" in frames else None,
         tool_frame=_read_pose(frames, "tool", POSE) if "tool" in frames else None,
         closure_tolerance=_read_tolerance(top),
@@ -274,18 +277,9 @@ def _read_stated(table: Table, geometry: Geometry, limbs: tuple[Limb, ...]) -> M
     for name in STATED_SIZES:
         units.setdefault(name, "mm")
     stated = {}
-    for name, value in _flat(table.data):
+    for name, value in table.flat():
         if name not in units:
             known = did_you_mean(name, units)
             table.fail("", f"the robot has no number {name!r}{known}", at=name)
         stated[name] = table.as_number(name, value, units[name])
     return stated
-
-
-def _flat(data: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Pairs of dotted name and value: an unquoted ``base1.x`` is a table within a table."""
-    for key, value in data.items():
-        if isinstance(value, Mapping):
-            yield from _flat(value, f"{prefix}{key}.")
-        else:
-            yield prefix + key, value

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NoReturn
 
 import numpy as np
 
@@ -23,7 +24,10 @@ _IN_PLANE = 1e-6  # what an axis may be out of the plane
 
 
 def check(tables: Sequence[Table], chains: Chains) -> None:
-    """Refuse what the core cannot take, and actuators that are not counted on."""
+    """Refuse what the core cannot take, and actuators that are not counted on.
+
+    `tables` are those of each limb.
+    """
     last = tables[-1]
     if chains.n_actuators < 1:
         last.fail("joints", "no joint has an actuator")
@@ -57,11 +61,7 @@ def check(tables: Sequence[Table], chains: Chains) -> None:
         if ball and group != 6:
             last.fail("joints", f"limb {i + 1}: a ball is no joint of the map {chains.map}")
         if chains.dependent(i):
-            last.fail(
-                "joints",
-                f"at home passive joints of limb {i + 1} can move while the platform stands still:"
-                " write one S of a rod as a U, or take home away from a dead point of the limb",
-            )
+            _fail_dependent(tables[i], chains, i)
     if layout.rows > MAX_CHAIN_ROWS:
         last.fail(
             "joints", f"the limbs close {layout.rows} rows, at most {MAX_CHAIN_ROWS} are possible"
@@ -74,6 +74,24 @@ def check(tables: Sequence[Table], chains: Chains) -> None:
             f"{n} actuator{'s' * (n > 1)}, {n + need - layout.rows} ways to move: the limbs leave"
             f" {layout.rows} closures for {need} unknowns with the actuators held",
         )
+
+
+def _fail_dependent(table: Table, chains: Chains, i: int) -> NoReturn:
+    """Refuse a limb whose passive joints do not follow from the pose of the platform alone."""
+    limb = chains.limbs[i]
+    remedy = "take home away from a dead point of the limb"
+    if sum(joint.kind == "S" for joint in limb) > 1:
+        remedy = "write one S of a rod as a U, or " + remedy
+    if any(joint.share is not None and joint.actuator is None for joint in limb):
+        remedy += (
+            "; every limb must be determined by itself: that another limb shares a joint and"
+            " determines it is not enough"
+        )
+    table.fail(
+        "joints",
+        f"at home passive joints of limb {i + 1} can move while the platform stands still:"
+        f" {remedy}",
+    )
 
 
 def _check_alike(table: Table, number: int, one: Joint, other: Joint) -> None:

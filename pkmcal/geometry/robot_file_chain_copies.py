@@ -27,9 +27,15 @@ class Listed(NamedTuple):
     turn: tuple[FloatArray, FloatArray]
 
 
-def copied(listed: Sequence[Listed]) -> tuple[list[tuple[Joint, ...]], list[Any]]:
-    """Every limb with its copies, groups copied together; errors by their public names."""
+def copied(
+    listed: Sequence[Listed],
+) -> tuple[list[tuple[Joint, ...]], list[Any], list[Table]]:
+    """Every limb with its copies, groups copied together; errors by their public names; tables.
+
+    The tables are those of each limb.
+    """
     limbs: list[tuple[Joint, ...]] = []
+    owners: list[Table] = []
     numbers: list[tuple[str, float, Table]] = []
     done: set[int] = set()
     for i, limb in enumerate(listed):
@@ -56,6 +62,7 @@ def copied(listed: Sequence[Listed]) -> tuple[list[tuple[Joint, ...]], list[Any]
                     for joint in listed[k].joints
                 )
                 limbs.append(made)
+                owners.append(listed[k].table)
                 for name, value in listed[k].values.items():
                     numbers.append(
                         (
@@ -64,7 +71,7 @@ def copied(listed: Sequence[Listed]) -> tuple[list[tuple[Joint, ...]], list[Any]
                             listed[k].table,
                         )
                     )
-    return limbs, numbers
+    return limbs, numbers, owners
 
 
 def _named(name: str, limb: int, of: Listed, copy: int, copies: int, used: int) -> str:

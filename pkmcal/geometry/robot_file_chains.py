@@ -57,13 +57,13 @@ def read_chains(
         else _of_kind(table, parameters, map, home)
         for table in tables
     ]
-    limbs, numbers = copied(listed)
+    limbs, numbers, owners = copied(listed)
     if len(limbs) > MAX_LIMBS:
         tables[-1].fail("", f"a robot has at most {MAX_LIMBS} limbs, with copies {len(limbs)}")
     tail, of_tail = read_tail(tail_tables, parameters, map, limbs)
     numbers += of_tail
     chains = Chains(map, home, tuple(limb + tail for limb in limbs), len(tail))
-    check(tables, chains)
+    check(owners, chains)
     values = {number.name: chains.blank.flat[number.place or 0] for number in chains.numbers}
     stated: set[str] = set()
     for name, value, table in numbers:

@@ -19,7 +19,7 @@ from pkmcal.files.toml_table import Table, shown
 from pkmcal.geometry.elastic import COMPLIANCE, GRAVITY, PER_LENGTH, Elastic, Spring
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.robot_file_limbs import Entry, Limbs, Parameters
-from pkmcal.geometry.ties import LimbNumber, Term
+from pkmcal.geometry.ties import LimbNumber
 from pkmcal.geometry.yielding import widened
 
 TOP = ("gravity", "gravity_tilt", "platform", "payload", "compliance", "balancer")
@@ -56,19 +56,16 @@ def read_elastic(
     _refuse_cables(top, limbs)
     order = {number.name: _place(limbs, number) for number in limbs.numbers}
     springs = sorted(yielding.values(), key=lambda each: order[each.spring.number])
-    entries: dict[str, Entry] = {}
+    numbers = _Numbers(parameters)
     for each in springs:
         name = COMPLIANCE + each.spring.number
-        entries[name] = each.compliance
+        numbers.entries[name] = each.compliance
         if each.per_length is not None:
-            entries[name + PER_LENGTH] = each.per_length
-    masses = {key: _masses(described, key, entries, parameters) for key in MASSES}
-    _read_carried(top, entries, parameters)
-    balancers = _read_balancers(top, entries, parameters)
-    tilts = top.list_of("gravity_tilt", 2, "two angles") if "gravity_tilt" in top else (0.0, 0.0)
-    for k, tilt in enumerate(tilts, 1):
-        term = parameters.term(top, "gravity_tilt", tilt, "rad")
-        entries[f"gravity.tilt{k}"] = parameters.entry(term)
+            numbers.entries[name + PER_LENGTH] = each.per_length
+    masses = {key: _masses(described, key, numbers) for key in MASSES}
+    _read_carried(top, numbers)
+    balancers = _read_balancers(top, numbers)
+    numbers.tilts(top)
     elastic = Elastic(
         tuple(each.spring for each in springs),
         rods=masses["mass"],
@@ -78,7 +75,7 @@ def read_elastic(
         gravity=_gravity(top),
         balancers=balancers,
     )
-    return elastic, _with_numbers(limbs, elastic, entries)
+    return elastic, _with_numbers(limbs, elastic, numbers.entries)
 
 
 # what yields ------------------------------------------------------------------------------------
@@ -139,8 +136,6 @@ def _of_table(top: Table, limbs: Limbs, parameters: Parameters) -> Iterator[tupl
                 given = of[at]
                 spring, per_length = _growing(of, spring, parameters)
             entry = parameters.entry(parameters.term(of, at, given, unit))
-            if entry.value < 0.0:
-                of.fail(at, f"must not be negative, found {shown(given)}")
             yield key, _Yields(spring, entry, per_length)
 
 
@@ -176,7 +171,7 @@ def _refuse_without(top: Table, described: Sequence[Table]) -> None:
         for key in keys:
             if key in table:
                 why = "pulls at a machine in which nothing yields: state stiffness or [compliance]"
-                table.fail(key, why)
+                table.fail(key, f'{why}, "offset*" = 0 where compliances are to be identified')
 
 
 def _refuse_cables(top: Table, limbs: Limbs) -> None:
@@ -187,76 +182,81 @@ def _refuse_cables(top: Table, limbs: Limbs) -> None:
 # what pulls -------------------------------------------------------------------------------------
 
 
-def _masses(
-    described: Sequence[Table], key: str, entries: dict[str, Entry], parameters: Parameters
-) -> tuple[int, ...]:
+def _masses(described: Sequence[Table], key: str, numbers: _Numbers) -> tuple[int, ...]:
     """Limbs that state a mass under this key."""
     having = tuple(i for i, table in enumerate(described) if key in table)
     for i in having:
-        _number(described[i], key, "kg", f"mass.{MASSES[key]}{i + 1}", entries, parameters)
+        numbers.read(described[i], key, "kg", f"mass.{MASSES[key]}{i + 1}")
     return having
 
 
-def _number(
-    table: Table,
-    key: str,
-    unit: Unit,
-    name: str,
-    entries: dict[str, Entry],
-    parameters: Parameters,
-    default: float | None = None,
-) -> None:
-    """Read one number, which is not negative unless it has the unit of a place."""
-    value = table[key] if default is None else table.data.get(key, default)
-    entries[name] = parameters.entry(parameters.term(table, key, value, unit))
-    if unit in ("kg", "N/mm") and entries[name].value < 0.0:
-        table.fail(key, f"must not be negative, found {shown(value)}")
+class _Numbers:
+    """Numbers of what yields and pulls as they are read, by name.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        Which they may name.
+    """
+
+    def __init__(self, parameters: Parameters) -> None:
+        self.parameters = parameters
+        self.entries: dict[str, Entry] = {}
+
+    def read(
+        self, table: Table, key: str, unit: Unit, name: str, default: float | None = None
+    ) -> None:
+        """One number, which is not negative unless it has the unit of a place."""
+        value = table[key] if default is None else table.data.get(key, default)
+        self._put(table, key, unit, name, value)
+        if unit in ("kg", "N/mm") and self.entries[name].value < 0.0:
+            table.fail(key, f"must not be negative, found {shown(value)}")
+
+    def vector(self, table: Table, key: str, unit: Unit, name: str, needed: bool = False) -> None:
+        """Three numbers, by default 0."""
+        given: Sequence[Any] = (0.0, 0.0, 0.0)
+        if needed or key in table:
+            given = table.list_of(key, 3, "three numbers")
+        for axis, value in zip("xyz", given, strict=True):
+            self._put(table, key, unit, f"{name}.{axis}", value)
+
+    def tilts(self, top: Table) -> None:
+        """The two tilts of gravity, by default 0."""
+        key = "gravity_tilt"
+        given = top.list_of(key, 2, "two angles") if key in top else (0.0, 0.0)
+        for k, tilt in enumerate(given, 1):
+            self._put(top, key, "rad", f"gravity.tilt{k}", tilt)
+
+    def _put(self, table: Table, key: str, unit: Unit, name: str, value: Any) -> None:
+        self.entries[name] = self.parameters.entry(self.parameters.term(table, key, value, unit))
 
 
-def _vector(
-    table: Table,
-    key: str,
-    unit: Unit,
-    name: str,
-    entries: dict[str, Entry],
-    parameters: Parameters,
-    needed: bool = False,
-) -> None:
-    """Read three numbers, by default 0."""
-    given: Sequence[Any] = (0.0, 0.0, 0.0)
-    if needed or key in table:
-        given = table.list_of(key, 3, "three numbers")
-    for axis, value in zip("xyz", given, strict=True):
-        term: Term = parameters.term(table, key, value, unit)
-        entries[f"{name}.{axis}"] = parameters.entry(term)
-
-
-def _read_carried(top: Table, entries: dict[str, Entry], parameters: Parameters) -> None:
+def _read_carried(top: Table, numbers: _Numbers) -> None:
     """The masses of platform and payload, and what else pulls at the tool."""
     if "platform" in top:
         table = top.table("platform")
         table.only(("mass", "centre"))
-        _number(table, "mass", "kg", "mass.platform", entries, parameters)
-        _vector(table, "centre", "mm", "centre.platform", entries, parameters)
+        numbers.read(table, "mass", "kg", "mass.platform")
+        numbers.vector(table, "centre", "mm", "centre.platform")
     if "payload" in top:
         table = top.table("payload")
         table.only(("mass", "centre", "force", "moment"))
-        _number(table, "mass", "kg", "payload.mass", entries, parameters, 0.0)
-        _vector(table, "centre", "mm", "payload.centre", entries, parameters)
-        _vector(table, "force", "N", "payload.force", entries, parameters)
-        _vector(table, "moment", "N mm", "payload.moment", entries, parameters)
+        numbers.read(table, "mass", "kg", "payload.mass", 0.0)
+        numbers.vector(table, "centre", "mm", "payload.centre")
+        numbers.vector(table, "force", "N", "payload.force")
+        numbers.vector(table, "moment", "N mm", "payload.moment")
 
 
-def _read_balancers(top: Table, entries: dict[str, Entry], parameters: Parameters) -> int:
+def _read_balancers(top: Table, numbers: _Numbers) -> int:
     if "balancer" not in top:
         return 0
     tables = top.tables("balancer", "a robot with balancers")
     for j, table in enumerate(tables, 1):
         table.only(("base", "platform", "rate", "free"))
         for end in ("base", "platform"):
-            _vector(table, end, "mm", f"balancer{j}.{end}", entries, parameters, needed=True)
-        _number(table, "rate", "N/mm", f"balancer{j}.rate", entries, parameters)
-        _number(table, "free", "mm", f"balancer{j}.free", entries, parameters)
+            numbers.vector(table, end, "mm", f"balancer{j}.{end}", needed=True)
+        numbers.read(table, "rate", "N/mm", f"balancer{j}.rate")
+        numbers.read(table, "free", "mm", f"balancer{j}.free")
     return len(tables)
 
 

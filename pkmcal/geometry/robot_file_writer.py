@@ -89,6 +89,7 @@ def _sections(model: Model) -> dict[str, Mapping[str, Any]]:
             name: geometry[name] for name in geometry.parameters if not is_of_load(name)
         },
         "calibration": {"free": list(model.free)} if model.free else {},
+        "uncertainty": model.uncertainty.table(),
         "stated": model.stated,
     }
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from pkmcal.arguments import number
-from pkmcal.arrays import FloatArray
+from pkmcal.arrays import FloatArray, Unit
 from pkmcal.core.library import SLOTS
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.carried import CARRIED, Load
@@ -43,18 +43,26 @@ def widened(
     return made, np.hstack([blank, np.zeros((rows, len(units)))])
 
 
-def yielding(model: Model, compliance: Mapping[str, float]) -> Model:
+def yielding(
+    model: Model, compliance: Mapping[str, float], ways: Sequence[float] | None = None
+) -> Model:
     """The model with numbers that yield, mm/N and rad/(N mm), by name or wildcard.
+
+    Where `ways` are given, of each drive in mm, compliances grow along them by numbers that are 0
+    there.
 
     Raises
     ------
     ValueError, TypeError
-        A name that matches no number of a limb, a ratio, or a compliance below 0.
+        A name that matches no number of a limb, a ratio, or a compliance below 0; with `ways` one
+        of no leg or screw.
     """
     wanted: dict[str, float] = {}
     for pattern, value in compliance.items():
         number(f"compliance of {pattern}", value, least=0.0)
-        wanted |= dict.fromkeys(_matching(model, pattern), float(value))
+        wanted |= dict.fromkeys(elastic_numbers(model, pattern), float(value))
+    if ways is not None:
+        return _with_springs(model, wanted, ways)
     known = {name: value for name, value in wanted.items() if COMPLIANCE + name in model.geometry}
     if known:
         changed = {COMPLIANCE + name: value for name, value in known.items()}
@@ -63,8 +71,8 @@ def yielding(model: Model, compliance: Mapping[str, float]) -> Model:
     return _with_springs(model, fresh) if fresh else model
 
 
-def _matching(model: Model, pattern: str) -> list[str]:
-    """Numbers of limbs that match, each a length or an angle."""
+def elastic_numbers(model: Model, pattern: str) -> list[str]:
+    """Numbers of limbs that match a name or wildcard, each a length or an angle."""
     rigid = model.rigid.geometry
     units = {each.name: each.unit for each in rigid.numbers}
     hits = [name for name in rigid.match(pattern, "compliance") if name in units]
@@ -91,14 +99,26 @@ def carrying(model: Model, load: Load) -> Model:
     return model.with_geometry(model.geometry.replace(numbers))
 
 
-def _with_springs(model: Model, fresh: Mapping[str, float]) -> Model:
+def _with_springs(
+    model: Model, fresh: Mapping[str, float], ways: Sequence[float] | None = None
+) -> Model:
     rigid, before = model.rigid.geometry, model.elastic or Elastic(())
     place = dict(zip(rigid.names, rigid.slot_index.tolist(), strict=False))
     units = dict(zip(rigid.names, rigid.units, strict=True))
-    springs = [*before.springs, *(Spring(name, units[name]) for name in fresh)]
-    springs.sort(key=lambda spring: place[spring.number])
+    of_number = {spring.number: spring for spring in before.springs}
+    of_number |= {name: _spring(name, units[name], ways) for name in fresh}
+    springs = sorted(of_number.values(), key=lambda spring: place[spring.number])
     compliance = {COMPLIANCE + name: value for name, value in fresh.items()}
     return _with(model, replace(before, springs=tuple(springs)), compliance)
+
+
+def _spring(name: str, unit: Unit, ways: Sequence[float] | None) -> Spring:
+    if ways is None:
+        return Spring(name, unit)
+    if unit != "mm" or not name.startswith("offset"):
+        raise ArgumentError(f"per_length: of a leg or a screw, and {name} has no way to grow by")
+    drive = int(name.removeprefix("offset")) - 1
+    return Spring(name, unit, drive, float(ways[drive]))
 
 
 def _with(model: Model, elastic: Elastic, fresh: Mapping[str, float]) -> Model:

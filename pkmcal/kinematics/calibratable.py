@@ -16,6 +16,7 @@ from pkmcal.arms.inputs import ERRORS
 from pkmcal.arrays import BoolArray, FloatArray, Int32Array, as_rows
 from pkmcal.core import screws
 from pkmcal.exceptions import ArgumentError
+from pkmcal.geometry.stated_uncertainty import NOTHING, StatedUncertainty
 from pkmcal.kinematics.robot import Robot
 
 _OK, _INVALID = 0, 4  # of a row, as in `Forward`
@@ -74,6 +75,10 @@ class FreeByDefault(Protocol):
     def free(self) -> tuple[str, ...]:
         """Numbers that a calibration frees unless it is given others."""
 
+    @property
+    def uncertainty(self) -> StatedUncertainty:
+        """How wrong numbers may be that it does not look for."""
+
 
 class Calibratable(Protocol):
     """A machine that can be calibrated: `Robot`, and a `SerialArm` through `ArmMachine`."""
@@ -127,12 +132,12 @@ class Calibratable(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class ArmGeometry:
-    """The joint errors of an arm by name: ``joint1.dx`` … ``joint6.dpsi``.
+    """The numbers of an arm by name: joint errors, ``joint1.dx`` … ``joint6.dpsi``, then laws.
 
     Attributes
     ----------
-    names, units : tuple of str, 6 n
-    values : ndarray (6 n,)
+    names, units : tuple of str, p
+    values : ndarray (p,)
         mm and rad.
     """
 
@@ -154,16 +159,17 @@ class ArmGeometry:
             if not hits:
                 known = did_you_mean(pattern, self.names)
                 lead = f"{argument}: " if argument else ""
-                raise ArgumentError(f"{lead}no joint error matches {pattern!r}{known}")
+                raise ArgumentError(f"{lead}no number of the arm matches {pattern!r}{known}")
             found.update(dict.fromkeys(hits))
         return list(found)
 
 
 @dataclass(frozen=True)
 class ArmModel:
-    """What an arm declares: all its joint errors are free."""
+    """What an arm declares: all its joint errors are free, what its joints add is held."""
 
     free: tuple[str, ...]
+    uncertainty: StatedUncertainty = NOTHING
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,13 +202,25 @@ class ArmMachine:
         joints = range(1, arm.n_joints + 1)
         names = tuple(f"joint{i}.{error}" for i in joints for error in ERRORS)
         units = ("mm", "mm", "mm", "rad", "rad", "rad") * arm.n_joints
-        self.geometry = ArmGeometry(names, units, arm.joint_errors.reshape(-1))
+        values = arm.joint_errors.reshape(-1)
         self.model = ArmModel(names)
+        if arm.laws is not None:
+            names, units = names + arm.laws.names, units + arm.laws.units
+            values = np.concatenate([values, arm.laws.values])
+        self.geometry = ArmGeometry(names, units, values)
         self.home = screws.pose(arm.home.reshape(1, 16))[0]
 
     def replace(self, changes: FloatArray) -> ArmMachine:
-        """With other joint errors (6 n,), mm and rad."""
-        return ArmMachine(self.arm.replace(changes.reshape(-1, 6)))
+        """With other joint errors (6 n,) and numbers of its joints' laws, mm and rad."""
+        of_joints = 6 * self.n_actuators
+        arm = self.arm.replace(changes[:of_joints].reshape(-1, 6))
+        if arm.laws is not None:
+            arm = arm.with_laws(arm.laws.with_values(changes[of_joints:]))
+        return ArmMachine(arm)
+
+    def approaching(self, approach: FloatArray) -> ArmMachine:
+        """With joints that come from there (N, n)."""
+        return ArmMachine(self.arm.approaching(approach))
 
     def with_values(self, values: FloatArray) -> ArmMachine:
         """The same as `replace`, which is quick here."""
@@ -216,11 +234,14 @@ class ArmMachine:
         return ArmPoses(screws.pose(motions), status)
 
     def error_twists(self, pose: ArrayLike, actuators: ArrayLike) -> FloatArray:
-        """Turning of the tool, then velocity of its origin, by each error: (N, 6, 6 n).
+        """Turning of the tool, then velocity of its origin, by each number: (N, 6, p).
 
         In base axes, at joint coordinates `actuators` (N, n); an arm needs no pose.
         """
-        return self.arm.error_jacobian(actuators, frame="tip")
+        by_errors = self.arm.error_jacobian(actuators, frame="tip")
+        if self.arm.laws is None:
+            return by_errors
+        return np.concatenate([by_errors, self.arm.law_jacobian(actuators, "tip")], axis=-1)
 
     def actuator_twists(self, pose: ArrayLike, actuators: ArrayLike) -> FloatArray:
         """The same by each joint coordinate, (N, 6, n)."""

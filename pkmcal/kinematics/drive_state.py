@@ -1,17 +1,21 @@
-"""What drives depend on beside their readings: from where they came, and under which tension."""
+"""What a machine depends on beside what its actuators read: how these came there, and its load."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.geometry.carried import Load
+from pkmcal.kinematics.calibratable import ArmMachine
 from pkmcal.kinematics.robot import Robot
+
+M = TypeVar("M")
 
 
 class DriveState(NamedTuple):
-    """Of each actuator at N rows; None where nothing is known.
+    """Of each actuator, and of the platform, at N rows; None where nothing is known.
 
     Attributes
     ----------
@@ -19,17 +23,26 @@ class DriveState(NamedTuple):
         +1 where its reading had grown, -1 where it had fallen, 0 where that is not known.
     tension : ndarray (N, n) or None
         Of what it drives, N.
+    load : ndarray (N, 10) or None
+        What the platform carries, as `pkmcal.geometry.carried.Load.rows` has it. A machine of which
+        nothing yields does not follow it.
     """
 
     approach: FloatArray | None = None
     tension: FloatArray | None = None
+    load: FloatArray | None = None
 
     def at(self, rows: IntArray | np.intp) -> DriveState:
         """That of some rows, or of one."""
         return DriveState(*(None if each is None else each[rows] for each in self))
 
-    def of(self, robot: Robot) -> Robot:
-        """The robot in this state."""
-        if self.approach is not None:
-            robot = robot.approaching(self.approach)
-        return robot if self.tension is None else robot.tensioned(self.tension)
+    def of(self, machine: M) -> M:
+        """The machine in this state: a robot, or an arm, on which tension and load do nothing."""
+        found: Any = machine
+        if isinstance(found, Robot | ArmMachine) and self.approach is not None:
+            found = found.approaching(self.approach)
+        if isinstance(found, Robot) and self.tension is not None:
+            found = found.tensioned(self.tension)
+        if isinstance(found, Robot) and self.load is not None and found.rigid is not found:
+            found = found.under(Load.of_rows(self.load))
+        return cast(M, found)

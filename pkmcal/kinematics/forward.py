@@ -66,6 +66,9 @@ class Forward(RowResult):
     _q: FloatArray
     _guess: FloatArray
 
+    def __post_init__(self) -> None:
+        """Arrays can be written to: `Robot.forward` does so where it is given this as `out`."""
+
     @cached_property
     def conditioning(self) -> FloatArray:
         """σ_min/σ_max of the closures by a twist (...), computed when asked for.

@@ -236,6 +236,7 @@ class Kinematics:
             q = self.machine.inverse(self.slots, self.frames.inward(rows), about, into)
         else:
             q = written(self._completed(rows, match, about).q, into)
+        q = q if into is not None else np.ascontiguousarray(q)  # rows may be handed to C
         return q.reshape(*shape, self.n_actuators)
 
     def under(self: K, load: Load) -> K:

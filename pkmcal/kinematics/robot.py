@@ -503,7 +503,7 @@ class Robot(Kinematics, Result):
         """The machine without what yields and what pulls at it; itself where nothing yields."""
         return self if self.model.elastic is None else Robot(self.model.rigid)
 
-    def yielding(self, compliance: Mapping[str, float]) -> Robot:
+    def yielding(self, compliance: Mapping[str, float], *, per_length: bool = False) -> Robot:
         """The machine with numbers of its limbs that yield.
 
         Parameters
@@ -511,6 +511,9 @@ class Robot(Kinematics, Result):
         compliance : mapping of str to float
             By name or wildcard of numbers, mm/N and rad/(N mm), 0 or more. Numbers that yield
             already get the new compliance.
+        per_length : bool
+            Whether compliances, of legs and screws alone, also grow along the way of their drive,
+            by ``compliance.offset1.per_length``, 0 as yet, from where they are at home.
 
         Returns
         -------
@@ -530,7 +533,8 @@ class Robot(Kinematics, Result):
         >>> robot.geometry["compliance.offset1"]
         5e-05
         """
-        return Robot(yielding(self.model, compliance))
+        ways = self.rigid.drives(self.rigid.home_actuators[None])[0] if per_length else None
+        return Robot(yielding(self.model, compliance, ways))
 
     def carrying(self, load: Load) -> Robot:
         """The machine with another payload stated, which `replace` and `save` keep.

@@ -13,8 +13,9 @@ from pkmcal.files.csv_table import Table
 from pkmcal.files.csv_writer import WrittenColumn
 from pkmcal.files.units import UNITS, plain
 from pkmcal.measurements.actuator_columns import columns_of_actuators
-from pkmcal.measurements.field import Field, of_actuators, one_or_each
+from pkmcal.measurements.field import Field, one_or_each
 from pkmcal.readings.reading import Reading
+from pkmcal.readings.rows import of_actuators
 
 
 class ActuatorSigma(Field):

@@ -12,7 +12,8 @@ from pkmcal.exceptions import ArgumentError
 from pkmcal.files.csv_table import Table
 from pkmcal.files.csv_writer import WrittenColumn, numbered
 from pkmcal.measurements.actuator_columns import read_of_actuators
-from pkmcal.measurements.field import Field, of_actuators
+from pkmcal.measurements.field import Field
+from pkmcal.readings import rows
 from pkmcal.readings.reading import Reading
 
 
@@ -22,18 +23,15 @@ class Approach(Field):
     logged = True
 
     def kept(self, given: Any, m: Any) -> FloatArray:
-        """Signs (N, n); "order": by the order of the rows."""
+        """Signs (N, n); "order": by the order of the rows, and of both places of each."""
         if isinstance(given, str):
             if given != "order":
                 raise ArgumentError(f"approach must be 'order' or numbers; found {given!r}")
-            moved = np.sign(np.diff(m.actuators, axis=0, prepend=m.actuators[:1]))
-            for row, before in zip(moved[1:], moved[:-1], strict=True):
-                row[row == 0.0] = before[row == 0.0]  # it stood still since
-            return np.asarray(moved)
-        found = of_actuators("approach", given, m.actuators.shape)
-        if not np.isin(found, (-1.0, 0.0, 1.0)).all():
-            raise ArgumentError("approach must be 1, -1 or 0 for each actuator")
-        return found
+            if m.other is None:
+                return _in_order(m.actuators)
+            way = np.stack([m.actuators, m.other], axis=1)  # from each place to the next
+            return _in_order(way.reshape(-1, way.shape[2]))[::2]
+        return rows.signs("approach", given, m.actuators.shape)
 
     def names(self, actuators: Collection[str], components: Collection[str]) -> set[str]:
         """One for all actuators, or one for each."""
@@ -51,3 +49,11 @@ class Approach(Field):
     def said(self, m: Any) -> str:
         """That it is stated."""
         return "" if m.approach is None else "approach stated"
+
+
+def _in_order(way: FloatArray) -> FloatArray:
+    """From where each actuator came to each place (P, n), one after the other."""
+    moved: FloatArray = np.sign(np.diff(way, axis=0, prepend=way[:1]))
+    for row, before in zip(moved[1:], moved[:-1], strict=True):
+        row[row == 0.0] = before[row == 0.0]  # it stood still since
+    return moved

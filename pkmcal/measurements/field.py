@@ -34,11 +34,22 @@ class Field:
         Whether it is taken from the log of a controller that is joined.
     log_first : bool
         Whether that of a log is taken in the place of the instrument's.
+    unit : str or None
+        Of its one column, where it has no methods for columns of its own; "": numbers without unit,
+        None: names.
     """
 
     name = ""
     logged = False
     log_first = False
+    unit: str | None = ""
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        if cls.columns is not Field.columns and cls.read is Field.read:
+            raise TypeError(f"{cls.__name__}: has columns of its own, and no method read for them")
+        if cls.kept is Field.kept:
+            raise TypeError(f"{cls.__name__}: has no method kept, which checks what is given")
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name
@@ -69,13 +80,20 @@ class Field:
         return {self.name}
 
     def read(self, table: Table, instrument: Reading, units: Sequence[str]) -> Any:
-        """What a table states; None where it states nothing. `units` are those of the actuators."""
-        return None
+        """What a table states; None where it states nothing. `units` are those of the actuators.
+
+        By default its one column: numbers, NaN where a cell is empty, or names.
+        """
+        if self.name not in table.columns:
+            return None
+        if self.unit is None:
+            return np.array(table.texts(self.name))
+        return table.numbers(self.name, self.unit or "1", blank=True)[0]
 
     def columns(self, m: Any, units: Sequence[str]) -> Iterator[WrittenColumn]:
-        """Its columns in a file; none where it is None."""
+        """Its columns in a file; by default one of the entries (N,), none where it is None."""
         if self.of(m) is not None:
-            yield WrittenColumn(self.name, "", self.of(m))
+            yield WrittenColumn(self.name, self.unit or "", self.of(m))
 
     def framed(self, m: Any) -> Iterator[WrittenColumn]:
         """Its columns in a data frame."""
@@ -117,18 +135,6 @@ def integers(name: str, given: ArrayLike, rows: int) -> Int64Array:
         row = int(np.argmax(array != np.round(array)))
         raise ArgumentError(f"{name} must be whole numbers; found {array[row]} in row {row}")
     return array.astype(np.int64)
-
-
-def of_actuators(
-    name: str, given: ArrayLike, shape: tuple[int, ...], blank: bool = False
-) -> FloatArray:
-    """Numbers of each actuator (N, n), given for all, for each or for each row."""
-    found = numbers(name, given, blank)
-    if found.shape not in ((), shape[1:], shape):
-        raise ArgumentError(
-            f"{name} must be one number or have shape {shape[1:]} or {shape}; found {found.shape}"
-        )
-    return np.array(np.broadcast_to(found, shape))
 
 
 def one_or_each(name: str, units: Sequence[str], values: FloatArray) -> Iterator[WrittenColumn]:

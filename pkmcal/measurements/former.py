@@ -35,11 +35,14 @@ OF_MEASURE = {
     "mounting": "mounting",
     "touched": "places",
 }
-_PASSED_OVER = ("artefact", "mounting", "places")  # were without effect on other kinds
 
 
 def adapted(
-    call: str, instrument: Reading, given: Mapping[str, Any], known: Mapping[str, str]
+    call: str,
+    instrument: Reading,
+    given: Mapping[str, Any],
+    known: Mapping[str, str],
+    present: Collection[str],
 ) -> Reading:
     """The instrument with fields that were given as arguments of `call`.
 
@@ -49,6 +52,8 @@ def adapted(
         The arguments by name; those that are None are not given.
     known : mapping of str to str
         `OF_MEASUREMENTS` or `OF_MEASURE`.
+    present : collection of str
+        The arguments of today, one of which may have been meant.
 
     Raises
     ------
@@ -59,13 +64,11 @@ def adapted(
     """
     for name in given:
         if name not in known:
-            near = did_you_mean(name, known, listed=0)
+            near = did_you_mean(name, present, listed=0)
             raise TypeError(f"{call}() got an unexpected argument {name!r}{near}")
     fields = {known[name]: value for name, value in given.items() if value is not None}
     fields = {k: v for k, v in fields.items() if not (isinstance(v, tuple) and not v)}
     own = _fields_of(instrument)
-    if call == "measure":
-        fields = {k: v for k, v in fields.items() if k in own or k not in _PASSED_OVER}
     words = {field: name for name, field in known.items()}
     for field in fields:
         if field not in own:

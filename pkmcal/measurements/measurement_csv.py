@@ -18,6 +18,7 @@ columns                               meaning
 ``cov.x.y [mm*mm]`` …                 … or their covariances, all on and above the diagonal
 ``actuator_sigma [mm]``               standard deviation of what every actuator read
 ``actuator_sigma.q1 [mm]`` …          … or of each of them
+``KIND.FIELD``                        what an instrument of a class of your own has for all rows
 ``group``                             a whole number, the same for repeats of one pose
 ``session``                           when the row was measured, by a name
 ``time``                              when, in seconds or as a time-stamp
@@ -25,6 +26,9 @@ columns                               meaning
                                       ``.q1`` …, of what that actuator drives
 ``approach.q1`` …                     1 or -1: the reading had grown or fallen; 0: not known
 ``tension.q1`` …                      of what the actuator drives, N, or one ``tension`` for all
+``payload [kg]``                      what the platform carried; its centre in the frame of the tool
+                                      ``payload.x [mm]`` ``.y`` ``.z``, 0 without
+``force.x [N]``, ``moment.x [N mm]``  what pulled at the tool, with ``.y`` and ``.z``
 ``tension_sigma.q1`` …                standard deviation of what load cells read, N, or one for all
 ``target``                            name of the target that the row measured
 ``target.x [mm]`` ``.y`` ``.z``       its place on the platform (the fixed point of a distance)
@@ -56,8 +60,9 @@ covariances in products of mm and rad; actuators also in steps where the robot h
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from os import PathLike
 from typing import Any, cast
 
@@ -74,6 +79,7 @@ from pkmcal.kinematics.reading_units import Actuated
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.actuator_columns import actuators_in, compare, read_actuators
 from pkmcal.measurements.field import row_fields
+from pkmcal.measurements.inverted import inverted, turned_round
 from pkmcal.measurements.join import join as joined
 from pkmcal.measurements.join import way_and_shift
 from pkmcal.measurements.measurements import Measurements
@@ -87,6 +93,7 @@ from pkmcal.measurements.probe import (
     probed,
 )
 from pkmcal.measurements.table_layout import (
+    OWN_ORDER,
     Layout,
     checked_rotation,
     layout,
@@ -97,6 +104,7 @@ from pkmcal.measurements.table_layout import (
 )
 from pkmcal.measurements.targets import read_several, read_targets, several_targets
 from pkmcal.readings.closure import Closure
+from pkmcal.readings.constants import headings_of_constants, with_constants
 from pkmcal.readings.points import Position
 from pkmcal.readings.reading import Reading
 from pkmcal.readings.registry import KINDS
@@ -117,6 +125,7 @@ def read_measurements(
     header: Sequence[str] = (),
     units: str | Sequence[str] = (),
     rotation: str | None = None,
+    invert_poses: bool = False,
     probe_offset: ArrayLike | None = None,
     kind: Reading | None = None,
 ) -> Measurements:
@@ -150,7 +159,11 @@ def read_measurements(
         Of columns without one: of lengths, of angles, or both, ``("mm", "deg")``.
     rotation : str, optional
         How orientations are stated where headings do not say: "ZYX" or another order of axes,
-        each about the turned axis; "xyz", about fixed axes; "rotvec"; "wxyz" or "xyzw".
+        each about the turned axis; "xyz", about fixed axes; "rotvec"; "wxyz" or "xyzw". Angles of
+        columns alpha, beta, gamma are "xyz" unless another order is stated.
+    invert_poses : bool
+        Poses, or orientations, are those of the base in the platform's frame, as a camera on the
+        platform sees a board on the base: they are turned round, a stated sigma with them.
     probe_offset : (3,) array
         Of a column ``probe``: the firmware's offsets of the probe, mm, as in `probed`; by default
         those of the robot file.
@@ -189,6 +202,8 @@ def read_measurements(
     table = _table(path, controller, join, how, joints)
     split_names(table)
     number_groups(table)
+    if kind is not None:
+        arguments.instance("kind", kind, Reading, ", an object of a class of your own")
     readings = [*KINDS.values(), *(() if kind is None else (kind,))]
     points = {name for each in readings for name in each.own_points}
     several = several_targets(table, points)
@@ -198,13 +213,14 @@ def read_measurements(
     actuators, units = read_actuators(table, robot)
     compare(table, units, robot)
     fill_in(table, robot, several)
-    read = _reading(table, several, readings).read(table, units)
+    read = with_constants(_reading(table, several, readings), table).read(table, units)
     fields = _read_fields(table, read, units)
     values: FloatArray | None
     if several:
         actuators, values, fields = read_several(table, several, actuators, fields, points)
     else:
-        values = _read_values(table, read, checked_rotation(rotation), actuators, robot)
+        nominal = partial(_nominal, robot, actuators, invert_poses)
+        values = _read_values(table, read, checked_rotation(rotation), nominal)
         read, targets = read_targets(table, read, readings)
         fields |= targets
     try:
@@ -217,6 +233,8 @@ def read_measurements(
             file=table.path.name,
             **fields,
         )
+        if invert_poses:
+            measured = inverted(measured)
     except ValueError as error:
         raise FileError(f"{table.path}: {error}") from None
     if read.by_firmware and isinstance(robot, Robot):
@@ -237,8 +255,7 @@ def _notes(table: Table) -> tuple[str, ...]:
 
 def _read_fields(table: Table, read: Reading, units: Sequence[str]) -> dict[str, Any]:
     """Fields of the rows that a table states."""
-    found = {each.name: each.read(table, read, units) for each in _FIELDS}
-    return found | {"lines": np.array(table.lines)}
+    return {each.name: each.read(table, read, units) for each in _FIELDS}
 
 
 def _read_probe(table: Table, robot: Actuated | None, offset: ArrayLike | None) -> Measurements:
@@ -333,7 +350,7 @@ def _known(
     names = {*actuators, "probe", "contact", *ANGLES, *orientation_in(table.columns)}
     names |= {f"{point}.{axis}" for point in (*points, *several) for axis in _AXES}
     for reading in readings:
-        names |= reading.names(table)
+        names |= reading.names(table) | headings_of_constants(reading)
     for field in _FIELDS:
         names |= field.names(actuators, components)
     return names
@@ -353,24 +370,27 @@ def _read_values(
     table: Table,
     read: Reading,
     rotation: str | None,
-    actuators: FloatArray,
-    robot: Actuated | None,
+    nominal: Callable[[], FloatArray | None],
 ) -> FloatArray | None:
     """What was measured, (N, k) or (N,); None without columns of it."""
-    if read.turning is not None and orientation_in(table.columns) not in ((), ANGLES):
+    form = orientation_in(table.columns)
+    own = form == ANGLES and rotation in (None, OWN_ORDER)
+    if read.turning is not None and form and not own:
         places = [table.numbers(*each)[0] for each in read.components[: read.turning]]
-        nominal = _nominal(robot, actuators)
         from pkmcal.measurements import orientation_forms  # imports SciPy
 
-        return np.column_stack([*places, orientation_forms.read(table, rotation, nominal)])
+        return np.column_stack([*places, orientation_forms.read(table, rotation, nominal())])
     columns = [table.numbers(*each, blank=True)[0] for each in read.columns_read(table)]
     if not columns:
         return None
     return columns[0] if len(columns) == 1 else np.stack(columns, axis=1)
 
 
-def _nominal(robot: Actuated | None, actuators: FloatArray) -> FloatArray | None:
-    """Angles (N, 3) of the machine as described, of some rows; NaN for the others."""
+def _nominal(robot: Actuated | None, actuators: FloatArray, invert: bool) -> FloatArray | None:
+    """Angles (N, 3) of the machine as described, of some rows; NaN for the others.
+
+    Or those of its base in the platform's frame.
+    """
     if robot is None:
         return None
     machine = as_machine(cast(Robot, robot))
@@ -379,4 +399,4 @@ def _nominal(robot: Actuated | None, actuators: FloatArray) -> FloatArray | None
     angles = np.full((len(actuators), 3), np.nan)
     some = np.unique(np.linspace(0, len(actuators) - 1, _TRIED).astype(int))
     angles[some] = machine.forward(actuators[some]).pose[:, 3:]
-    return angles
+    return turned_round(angles, 0) if invert else angles

@@ -8,6 +8,7 @@ from typing import Any
 
 from pkmcal.files.csv_writer import WrittenColumn, numbered, write_csv
 from pkmcal.measurements.field import row_fields
+from pkmcal.readings.constants import columns_of_constants
 
 
 def write_measurements(
@@ -48,6 +49,7 @@ def _columns(m: Any, units: Sequence[str]) -> Iterator[WrittenColumn]:
     for column in numbered("", units, m.actuators):
         yield column._replace(name=column.name[1:])
     yield from m.instrument.columns_in_file(units)
+    yield from columns_of_constants(m.instrument, len(m))
     yield from m.instrument.value_columns(m.values.reshape(len(m), -1))
     for field in row_fields(type(m)):
         yield from field.columns(m, units)

@@ -18,6 +18,7 @@ from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.drive_state import DriveState
 from pkmcal.measurements.actuator_sigma import ActuatorSigma
 from pkmcal.measurements.approach import Approach
+from pkmcal.measurements.carried_load import CarriedLoad
 from pkmcal.measurements.field import declared, row_fields, units_of_actuators, values_array
 from pkmcal.measurements.former import OF_MEASUREMENTS, adapted
 from pkmcal.measurements.listing import table, title
@@ -31,8 +32,9 @@ from pkmcal.measurements.temperature import Temperature
 from pkmcal.measurements.tension import Tension, TensionSigma, filled_tension
 from pkmcal.measurements.time_stamps import Time
 from pkmcal.measurements.tracker import Tracker
+from pkmcal.readings.constants import columns_of_constants
 from pkmcal.readings.reading import Reading
-from pkmcal.readings.registry import Kind, as_reading
+from pkmcal.readings.registry import Kind, as_reading, stated
 from pkmcal.readings.rows import numbers
 from pkmcal.result import Result
 
@@ -50,9 +52,10 @@ class Measurements(Result):
         `identify` is given ``unknown="frame"``); see `kind`. NaN: not read there.
         One row is taken as it is: actuators (n,) with values (6,), (3,) or a number, and what else
         has one entry a row likewise.
-    kind : str or Reading
-        What was read: a word, or an object of `pkmcal.readings` with what its rows have of their
-        own. "pose": x y z alpha beta gamma of the platform, (N, 6). "position": x y z of the
+    kind : str or Reading, optional
+        What was read, by default as `instrument` has it, or a position: a word, or an object of
+        `pkmcal.readings` with what its rows have of their own.
+        "pose": x y z alpha beta gamma of the platform, (N, 6). "position": x y z of the
         target, (N, 3). "height": z of the target, (N,). "distance", `Distance(attachment)`: from
         the target, which here is a fixed point of the base frame, to a point of the platform, (N,).
         "closure": nothing, `values` is None; what the actuators read is all that is known.
@@ -81,7 +84,8 @@ class Measurements(Result):
     actuator_units : str or sequence of str, optional
         "mm" or "rad", one for all or one per actuator. None: not stated; written as mm.
     instrument : Reading, optional
-        As `kind` has it; `dataclasses.replace` hands it on.
+        As `kind` has it; `dataclasses.replace` hands it on. An object as `kind` is taken in its
+        place, a word has to be its kind.
     file : str
         The name of that file.
     notes : sequence of str
@@ -109,6 +113,10 @@ class Measurements(Result):
         Standard deviation of `tension`, N: it is then a reading, and the true tensions of a row are
         unknown. None: it is exact, or, of a robot whose file says that tensions balance its load,
         estimated from the rows. Kept as (N, n).
+    load : Load, or (10,) or (N, 10) array, optional
+        What the platform carried, in place of the payload that the robot file states: one load for
+        all rows or one a row. Kept as (N, 10): mass in kg, centre in the frame of the tool in mm,
+        force at the tool in N and moment in N mm, in the axes of the base.
     temperature : scalar, (N,) or (N, 2 + n) array, optional
         °C, of the whole machine, or of base, platform and what each actuator drives; NaN: not read.
         `identify` refers numbers to 20 °C where it is told how the machine expands. Kept as
@@ -152,6 +160,7 @@ class Measurements(Result):
     approach: FloatArray | None = declared(Approach())
     tension: FloatArray | None = declared(Tension())
     tension_sigma: FloatArray | None = declared(TensionSigma())
+    load: FloatArray | None = declared(CarriedLoad())
     lines: Int64Array | None = declared(Lines())
 
     # The types above are those of the attributes; anything array-like is taken.
@@ -159,7 +168,7 @@ class Measurements(Result):
         self,
         actuators: ArrayLike,
         values: ArrayLike | None,
-        kind: Kind | Reading | str = "position",
+        kind: Kind | Reading | str | None = None,
         *,
         sigma: ArrayLike | Tracker | None = None,
         target: ArrayLike | None = None,
@@ -172,11 +181,12 @@ class Measurements(Result):
         **fields: Any,
     ) -> None:
         of_rows = row_fields(type(self))
-        stated = {each.name: fields.pop(each.name, None) for each in of_rows}
-        stated |= {"sigma": sigma, "target_index": target_index}
-        if instrument is None or (isinstance(kind, str) and kind != instrument.name):
-            instrument = as_reading(kind)  # type: ignore[arg-type]
-        instrument = adapted("Measurements", instrument, fields, OF_MEASUREMENTS)
+        rowwise = {each.name: fields.pop(each.name, None) for each in of_rows}
+        rowwise |= {"sigma": sigma, "target_index": target_index}
+        present = (*rowwise, *_ARGUMENTS)
+        instrument = adapted(
+            "Measurements", stated(kind, instrument), fields, OF_MEASUREMENTS, present
+        )
         q = numbers("actuators", actuators)
         if q.ndim not in (1, 2) or 0 in q.shape:
             raise ArgumentError(
@@ -196,7 +206,7 @@ class Measurements(Result):
             "notes": words("notes", notes),
         })  # fmt: skip
         for each in of_rows:
-            given = stated[each.name]
+            given = rowwise[each.name]
             self.__setstate__({each.name: None if given is None else each.kept(given, self)})
         self.__setstate__({"target": checked_target(place, self)})
         self.__setstate__({"target_names": names_of_targets(target_names, self)})
@@ -266,9 +276,16 @@ class Measurements(Result):
 
     @property
     def drive_state(self) -> DriveState:
-        """From where actuators came, and the tension of what they drive, as far as it was read."""
+        """From where actuators came, tensions as far as they were read, and what was carried."""
         tension = None if self.tension is None else filled_tension(self.tension)
-        return DriveState(self.approach, tension)
+        return DriveState(self.approach, tension, self.load)
+
+    @property
+    def other_drive_state(self) -> DriveState:
+        """`drive_state` at the second place, of distances between two."""
+        state = self.drive_state
+        approach = self.instrument.approached(self.actuators, state.approach)
+        return state._replace(approach=approach)
 
     @property
     def sessions(self) -> tuple[str, ...]:
@@ -351,16 +368,52 @@ class Measurements(Result):
         """
         write_measurements(self, path, comment)
 
+    @staticmethod
+    def from_pandas(frame: Any, robot: Any = None, **options: Any) -> Measurements:
+        """Read a pandas data frame with the columns of a file; mm and rad where none is said.
+
+        Parameters
+        ----------
+        frame : pandas.DataFrame
+            Columns named as in files: ``q1``, ``z``, ``"z [um]"`` …; the index is left out.
+        robot : Robot, optional
+            The machine that was measured.
+        **options
+            Those of `read_measurements`: `rename`, `units`, `kind` …
+
+        Raises
+        ------
+        ValueError, TypeError
+            As `read_measurements`; line 1 is that of the headings.
+
+        Examples
+        --------
+        >>> frame = pandas.DataFrame({"q1": [450.0], "q2": [451.0], "z [um]": [120.0]})
+        ... # doctest: +SKIP
+        >>> Measurements.from_pandas(frame).values  # doctest: +SKIP
+        array([0.12])
+        """
+        from pkmcal.measurements.data_frame import measurements_of_frame
+
+        return measurements_of_frame(frame, robot, **options)
+
     def _columns(self) -> dict[str, Any]:
         """As the columns of a file, but for the units, which are mm and rad."""
         columns: dict[str, Any] = {f"q{i + 1}": q for i, q in enumerate(self.actuators.T)}
         values = self.values.reshape(len(self), -1)
         columns |= dict(zip(self.components, values.T, strict=True))
         units = self.actuator_units or ("",) * self.actuators.shape[1]
-        columns |= {each.name: each.values for each in self.instrument.columns(units)}
+        of_instrument = (
+            *self.instrument.columns(units),
+            *columns_of_constants(self.instrument, len(self)),
+        )
+        columns |= {each.name: each.values for each in of_instrument}
         fields = (column for each in row_fields(type(self)) for column in each.framed(self))
         return columns | {column.name: column.values for column in fields}
 
     def _parts(self) -> Iterator[str | Table]:
         yield title(self)
         yield table(self)
+
+
+_ARGUMENTS = ("kind", "target", "target_names", "actuator_units", "instrument", "file", "notes")

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Sequence
 from typing import Any
 
+import numpy as np
+
 from pkmcal.arrays import Int64Array
 from pkmcal.files.csv_table import Table
 from pkmcal.files.csv_writer import WrittenColumn
@@ -38,6 +40,10 @@ class Lines(Field):
     def names(self, actuators: Collection[str], components: Collection[str]) -> set[str]:
         """None."""
         return set()
+
+    def read(self, table: Table, instrument: Reading, units: Sequence[str]) -> Int64Array:
+        """Where each row stands."""
+        return np.array(table.lines, dtype=np.int64)
 
     def columns(self, m: Any, units: Sequence[str]) -> Iterator[WrittenColumn]:
         """None."""

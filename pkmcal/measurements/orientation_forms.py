@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from pkmcal.arrays import FloatArray
 from pkmcal.files.column_names import (
+    ANGLES,
     EULER,
     MATRIX,
     NUMBERED,
@@ -21,13 +22,15 @@ from pkmcal.files.column_names import (
     orientation_in,
 )
 from pkmcal.files.csv_table import Table
-from pkmcal.measurements.table_layout import ORDERS, QUATERNIONS, ROTATIONS
+from pkmcal.measurements.table_layout import ORDERS, OWN_ORDER, QUATERNIONS, ROTATIONS
 
 _UNIT = 0.02  # by so much the length of a quaternion or of a row of a matrix may differ from 1
 _ALIKE = 1.01  # of misfits that do not tell two conventions apart
 _ROUNDED = 1e-9  # rad
+_MOST = 3  # conventions that are named
 _FITS = np.radians(3.0)  # what errors of a machine do not turn it by
 _BETTER = 0.2  # of the misfit that another convention may leave to be named
+_ABSURD = np.radians(20.0)  # from which orientations are of another machine, or of other rows
 
 
 def read(table: Table, rotation: str | None, nominal: FloatArray | None) -> FloatArray:
@@ -56,7 +59,8 @@ def read(table: Table, rotation: str | None, nominal: FloatArray | None) -> Floa
     chosen = _chosen(table, said, forms, rotation)
     turns = forms[chosen]
     if nominal is not None:
-        _refuse_wrong(table, said, chosen, forms | _inverted(chosen, turns), nominal)
+        others = _inverted(chosen, turns) | _in_sequence(names, given)
+        _refuse_wrong(table, said, chosen, forms | others, nominal)
     angles: FloatArray = turns.as_euler("xyz")
     return angles
 
@@ -90,7 +94,7 @@ def _forms(names: Sequence[str], given: FloatArray) -> dict[str, Rotation]:
     forms = {}
     for order in ORDERS:
         angles = given
-        if names == EULER[0]:  # Rx belongs to x, whichever is turned first
+        if names in (EULER[0], ANGLES):  # Rx belongs to x, whichever is turned first
             if len(set(order.lower())) < 3:
                 continue
             angles = given[:, ["xyz".index(axis) for axis in order.lower()]]
@@ -136,12 +140,23 @@ def _chosen(table: Table, said: str, forms: dict[str, Rotation], rotation: str |
 
 def _inverted(chosen: str, turns: Rotation) -> dict[str, Rotation]:
     """Other readings of what the headings say."""
-    other = {f"{chosen} of the inverse (base in the platform's frame)": turns.inv()}
+    other = {f"{chosen} of the base in the platform's frame (--invert-poses)": turns.inv()}
     if chosen == "wxyz":
         other["xyzw"] = Rotation.from_quat(turns.as_quat()[:, [3, 0, 1, 2]])
     if chosen == "matrix":
         other = {"matrix by columns": turns.inv()}
     return other
+
+
+def _in_sequence(names: Sequence[str], given: FloatArray) -> dict[str, Rotation]:
+    """Columns of x, y and z as the first, second and third angle of an order."""
+    if names not in (EULER[0], ANGLES):
+        return {}
+    return {
+        f"{order}, one after the other (columns A, B, C)": Rotation.from_euler(order, given)
+        for order in ORDERS
+        if order.lower() != OWN_ORDER
+    }
 
 
 def _refuse_wrong(
@@ -152,9 +167,16 @@ def _refuse_wrong(
     if off[chosen] > _FITS and off[best] < min(_BETTER * off[chosen], _FITS):
         # xyzw read as wxyz is the inverse, up to a frame and a tool: what fits alike is named
         alike = [word for word in off if off[word] < _ALIKE * off[best] + _ROUNDED]
+        alike = alike[:_MOST]
         raise table.header_error(
             f"columns {said}: off by {_deg(off[chosen])} from this machine as {chosen}, by"
             f" {_deg(off[best])} as {' or '.join(alike)}"
+        )
+    if off[chosen] > _ABSURD:
+        raise table.header_error(
+            f"columns {said}: off by {_deg(off[chosen])} from this machine as {chosen}, by"
+            f" {_deg(off[best])} as {best}, which fits best: these orientations are of other rows"
+            " or of another machine, or columns are exchanged"
         )
 
 

@@ -6,18 +6,25 @@ import numpy as np
 
 from pkmcal.arrays import IntArray
 from pkmcal.measurements.measurements import Measurements
+from pkmcal.statistics.linear_fit import numbered
 
 
 def targets(measured: Measurements) -> IntArray:
-    """Which target each row is of, (N,), counted from 0: by its index, or by its place."""
+    """Which target each row is of, (N,), counted from 0: by its index, or by its place.
+
+    Rows of one target that differ in what else was read, a second place or an attachment, have
+    numbers of their own.
+    """
+    subject, place = measured.instrument.subject(len(measured)), measured.target
     if measured.target_index is not None:
-        return np.asarray(measured.target_index, dtype=np.intp)
-    if (subject := measured.instrument.subject(measured)) is not None:
-        return np.unique(subject, return_inverse=True)[1].reshape(-1)
-    place = measured.target
-    if place is None or place.ndim == 1:
-        return np.zeros(len(measured), dtype=np.intp)
-    return np.unique(place, axis=0, return_inverse=True)[1].reshape(-1)
+        own = np.asarray(measured.target_index, dtype=np.intp)
+        if not subject.any():
+            return own
+    elif place is None or place.ndim == 1:
+        return subject
+    else:
+        own = np.unique(place, axis=0, return_inverse=True)[1].reshape(-1)
+    return numbered(own, subject)
 
 
 def groups(measured: Measurements) -> IntArray:

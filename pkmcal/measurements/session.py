@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -11,11 +11,9 @@ from pkmcal import display
 from pkmcal.arguments import shown, words
 from pkmcal.arrays import TextArray
 from pkmcal.exceptions import ArgumentError
-from pkmcal.files.csv_table import Table
 from pkmcal.files.csv_writer import WrittenColumn
 from pkmcal.files.reading import LONGEST_NAME
 from pkmcal.measurements.field import Field
-from pkmcal.readings.reading import Reading
 from pkmcal.readings.rows import is_name
 
 
@@ -23,6 +21,7 @@ class Session(Field):
     """When the rows were measured."""
 
     logged = True
+    unit = None
 
     def kept(self, given: Any, m: Any) -> TextArray:
         """One name per row, given for all or for each."""
@@ -41,10 +40,6 @@ class Session(Field):
                     f" {LONGEST_NAME} characters and without '@'; found {shown(name)}"
                 )
         return np.array(names)
-
-    def read(self, table: Table, instrument: Reading, units: Sequence[str]) -> TextArray | None:
-        """Names."""
-        return np.array(table.texts(self.name)) if self.name in table.columns else None
 
     def printed(self, m: Any) -> Iterator[WrittenColumn]:
         """Its column, where there are several sessions."""

@@ -35,6 +35,7 @@ ORDERS = [  # of axes; capitals: each about the turned axis
     for order in itertools.product(letters, repeat=3)
     if order[0] != order[1] != order[2]
 ]
+OWN_ORDER = "xyz"  # of alpha, beta, gamma
 QUATERNIONS = ("wxyz", "xyzw")
 ROTATIONS = (*QUATERNIONS, "rotvec")
 
@@ -145,7 +146,7 @@ def open_table(
             name, unit = parted(new)
             column = table.columns[old]
             table.columns[old] = replace(column, unit=unit or column.unit)
-            if name in table.columns and name != old:
+            if name in table.columns and name not in how.rename:  # else they are exchanged
                 raise table.header_error(f"column {old!r} cannot be called {name!r}: it is another")
     renamed = {old: parted(new)[0] for old, new in how.rename.items()}
     headings = [renamed.get(name, name) for name in table.columns]

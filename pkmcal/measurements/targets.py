@@ -38,6 +38,9 @@ class TargetIndex(Field):
         """The target's name and place."""
         return {"target", *(f"target.{axis}" for axis in _AXES)}
 
+    def read(self, table: Table, instrument: Reading, units: Sequence[str]) -> None:
+        """Nothing: `read_targets` reads which target each row has together with their places."""
+
     def columns(self, m: Any, units: Sequence[str]) -> Iterator[WrittenColumn]:
         """The target's name and place; the reading's own points."""
         yield from self.framed(m)

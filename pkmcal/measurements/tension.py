@@ -12,8 +12,9 @@ from pkmcal.exceptions import ArgumentError
 from pkmcal.files.csv_table import Table
 from pkmcal.files.csv_writer import WrittenColumn, numbered
 from pkmcal.measurements.actuator_columns import read_of_actuators
-from pkmcal.measurements.field import Field, of_actuators
+from pkmcal.measurements.field import Field
 from pkmcal.readings.reading import Reading
+from pkmcal.readings.rows import of_actuators
 
 
 class Tension(Field):

@@ -14,9 +14,8 @@ from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray
 from pkmcal.display import first_rows
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
+from pkmcal.geometry.carried import Load
 from pkmcal.kinematics.calibratable import ArmMachine, Solvable
-from pkmcal.kinematics.drive_state import DriveState
-from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.former import OF_MEASURE, adapted
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.tracker import Tracker
@@ -25,6 +24,7 @@ from pkmcal.readings.registry import Kind, as_reading
 from pkmcal.readings.rows import numbers
 from pkmcal.readings.unknowns import POINT
 
+_ARGUMENTS = ("kind", "target", "approach", "tension", "load")  # of `measure`
 _ARM = 200.0  # mm; an instrument good to 0.02 mm over it is good to 1e-4 rad
 
 
@@ -87,6 +87,7 @@ class VirtualMachine:
         *,
         approach: ArrayLike | None = None,
         tension: ArrayLike | None = None,
+        load: Load | None = None,
         **former: Any,
     ) -> Measurements:
         """Command actuators and measure where the machine goes.
@@ -105,6 +106,8 @@ class VirtualMachine:
             From where the actuators come; see `Measurements`.
         tension : scalar, (n,) or (N, n) array, optional
             Of what each actuator drives, N.
+        load : Load, optional
+            What the machine carries, one for all rows or one a row.
 
         Returns
         -------
@@ -128,7 +131,7 @@ class VirtualMachine:
         n = getattr(self._machine, "n_actuators", actuators.shape[-1])
         if actuators.ndim != 2 or actuators.shape[1] != n or not actuators.size:
             raise ArgumentError(f"q must have shape (N, {n}) or ({n},); found {np.shape(q)}")
-        instrument = adapted("measure", as_reading(kind), former, OF_MEASURE)
+        instrument = adapted("measure", as_reading(kind), former, OF_MEASURE, _ARGUMENTS)
         if tension is not None:
             numbers("tension", tension)  # of what is driven it is known
         width = len(instrument.components)
@@ -140,8 +143,9 @@ class VirtualMachine:
             actuator_units=getattr(self._machine, "actuator_units", None),
             approach=approach,
             tension=tension,
+            load=load,
         )
-        exact = blank.instrument.simulated(blank, _Solving(self._machine, blank.drive_state))
+        exact = blank.instrument.simulated(blank, _Solving(self._machine, blank))
         noise, sigma = self._drawn(blank, exact)
         values = blank.instrument.corrected(exact, noise).reshape(blank.values.shape)
         known = blank.instrument.measured()
@@ -165,11 +169,11 @@ class _Solving:
     """The forward kinematics of a machine in the state of its drives."""
 
     machine: Any
-    state: DriveState
+    rows: Measurements
 
     def __call__(self, actuators: FloatArray, argument: str) -> Any:
-        moved = self.state.of(self.machine) if isinstance(self.machine, Robot) else self.machine
-        solved = moved.forward(actuators)
+        state = self.rows.other_drive_state if argument == "other" else self.rows.drive_state
+        solved = state.of(self.machine).forward(actuators)
         failed = np.flatnonzero(~np.asarray(solved.ok)).tolist()
         if failed:
             raise ArgumentError(

@@ -32,6 +32,7 @@ _TOGETHER = 512  # candidates that are looked at at once, as many as caches hold
 _ALIKE = 1e-6  # share by which an exchange must gain; rounding moves gains by up to 1e-7
 _STARTS = (1e-2, 1.0, 1e-4)  # candidates' worth of information that growing begins with
 _ROUNDED = 1e-9  # share by which a predicted error may exceed the one that was asked for
+_OPEN = 1e-6  # of a combination that is left open: a share of a parameter that is none
 _NOTHING = 1e-12  # share of the information of all candidates that is none
 
 
@@ -77,7 +78,7 @@ class Design:
             raise ArgumentError(
                 "candidates: what would be measured there depends on no parameter that is free"
             )
-        unit = basis[:, :rank] / singular[:rank]
+        unit = self._unit = basis[:, :rank] / singular[:rank]
         self.unidentifiable = basis[:, rank:]
         self._determinant = criterion == "D"
         self._blocks, self._all = blocks @ unit, np.arange(len(blocks))
@@ -98,6 +99,17 @@ class Design:
         if (errors[~known] > _NOTHING * errors.sum()).any():
             return float("inf")
         return float(np.sqrt((errors[known] / information[known]).sum()))
+
+    def deviations(self, chosen: IntArray) -> FloatArray:
+        """Standard deviations (n,) of the scaled parameters; inf of what these leave open."""
+        information, directions = np.linalg.eigh(self._information(chosen))
+        known = information > _NOTHING
+        ways = self._unit @ directions
+        found: FloatArray = np.sqrt((ways[:, known] ** 2 / information[known]).sum(axis=1))
+        left = np.hstack([ways[:, ~known], self.unidentifiable])
+        sizes = np.linalg.norm(self._unit, axis=1)
+        found[np.abs(left).max(axis=1, initial=0.0) > _OPEN * np.maximum(sizes, _OPEN)] = np.inf
+        return found
 
     def at_random(self, chosen: IntArray, draws: int) -> float:
         """Median of `predicted` over choices at random, of as many of each sort."""

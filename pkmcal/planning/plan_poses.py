@@ -16,6 +16,7 @@ from pkmcal.core.library import POSE
 from pkmcal.display import Table, fixed
 from pkmcal.estimation.parameters import Parameters, Prior
 from pkmcal.exceptions import ArgumentError
+from pkmcal.geometry.carried import Load
 from pkmcal.kinematics.calibratable import Calibratable, as_machine
 from pkmcal.kinematics.perturbed import ideal
 from pkmcal.kinematics.pulled import pulled
@@ -28,9 +29,11 @@ from pkmcal.planning.planned import (
     equations_of,
     information,
     planned,
+    stated_loads,
     together,
+    under,
 )
-from pkmcal.planning.tour import short_tour
+from pkmcal.planning.tour import short_tour, tour_length
 from pkmcal.planning.travel_weight import with_travel
 from pkmcal.readings.reading import Reading
 from pkmcal.readings.registry import KINDS, Kind, as_reading
@@ -68,7 +71,8 @@ class Plan(Result):
         The same for all candidates that keep the machine's limits.
     left_out : int
         How many candidates break limits, are not found by forward kinematics from home, are so
-        near a singularity that errors of the geometry bar the way there, or are `unpulled`.
+        near a singularity that errors of the geometry bar the way there or a payload makes the
+        machine give way, or are `unpulled`.
     parameters : tuple of str
         What the calibration is to find.
     travel : float
@@ -85,6 +89,10 @@ class Plan(Result):
         By what share the predicted error may grow for a tour that is shorter by a share, as given.
     predicted_unweighted, travel_unweighted : float
         Predicted error and length of the tour without this weight, mm.
+    stderr : ndarray (p,)
+        Expected standard deviations of `parameters`, in their units; inf where not determined.
+    load : Load or None
+        What the machine carries at each pose, where `payloads` were given.
     unpulled : int
         How many candidates within limits were left out because some cable would have to push there:
         under the load of the robot file or, where that states none, against what holds the platform
@@ -108,6 +116,8 @@ class Plan(Result):
     predicted_unweighted: float = float("nan")
     travel_unweighted: float = float("nan")
     unpulled: int = 0
+    stderr: FloatArray = field(default_factory=lambda: np.empty(0))
+    load: Load | None = None
 
     def __len__(self) -> int:
         return len(self.indices)
@@ -133,6 +143,10 @@ class Plan(Result):
         if several:
             heads.append("measure")
             rows = [[*row, kind] for row, kind in zip(rows, self.kinds, strict=True)]
+        if self.load is not None:
+            heads.append("payload [kg]")
+            masses = np.asarray(self.load.mass).tolist()
+            rows = [[*row, f"{mass:g}"] for row, mass in zip(rows, masses, strict=True)]
         yield f"{self.robot.name}: measure {count} for {len(self.parameters)} parameters{left_out}"
         yield (
             f"predicted error {self.predicted:.3g} mm rms; {count} at random"
@@ -171,6 +185,7 @@ def plan_poses(
     unknown: Unknown | Sequence[Unknown] = (),
     actuator_noise: ArrayLike | None = None,
     travel_weight: float = 0.0,
+    payloads: Sequence[float | Load] = (),
 ) -> Plan:
     """Choose poses to measure among candidates, by exchange.
 
@@ -221,6 +236,9 @@ def plan_poses(
         the tour is driven as often as there is time, if driving takes the time: the error falls
         with the root of the number of tours. The `accuracy` wanted is reached with any weight.
         Some ten times as many exchanges are tried as without.
+    payloads : sequence of float or Load
+        What a machine that yields carries in turn, kg: every candidate can be measured under each,
+        and the targets are to be met under each. Poses with one payload come one after another.
 
     Returns
     -------
@@ -247,26 +265,27 @@ def plan_poses(
     (20, True)
     """
     word("criterion", criterion, CRITERIA)
+    machine = as_machine(robot)
+    loads = stated_loads(machine, payloads)
     counts = _counts(kind, count, accuracy)
     kinds = list(counts)
-    machine = as_machine(robot)
-    poses, q, inside, offered, unpulled = _within_limits(machine, candidates)
+    poses, q, inside, offered, unpulled = _within_limits(machine, candidates, loads)
     aims = (poses, q) if targets is None else _aims(machine, targets)
     distinct, place = np.unique(q, axis=0, return_inverse=True)
     stated = {each: _of("target", target, each, kinds) for each in kinds}
     points = {k: as_rows("target", given, 3)[0] for k, given in stated.items() if given is not None}
     sets = [
         planned(machine, distinct, each, points.get(each), _of("noise", noise, each, kinds),
-                actuator_noise)
-        for each in kinds
+                actuator_noise, load)
+        for each in kinds for load in loads
     ]  # fmt: skip
     equations = equations_of(machine, sets, free, prior, unknown)
     parameters = equations[0].parameters
     safe = _safe(parameters, poses, q)
     rows = place.reshape(-1)[safe]
     blocks = together([information(each, len(distinct))[rows] for each in equations])
-    sort = np.repeat(np.arange(len(kinds)), len(rows))
-    design, own_frame = design_of(parameters, blocks, sort, *aims, criterion)
+    sort = np.repeat(np.arange(len(kinds)), len(loads) * len(rows))
+    design, own_frame = design_of(parameters, blocks, sort, *aims, criterion, loads)
     poses, q, inside = poses[safe], q[safe], inside[safe]
     everything = design.predicted(np.arange(len(blocks)))
     if everything == 0.0 and (criterion == "prediction" or accuracy is not None):
@@ -278,18 +297,18 @@ def plan_poses(
     weight = _weight(travel_weight, accuracy, criterion)
     if accuracy is None:
         of = "kind" if isinstance(kind, Mapping) else "count"
-        each = [whole(of, n, 1, len(q), ", the candidates") for n in counts.values()]
+        most = len(q) * len(loads)
+        each = [whole(of, n, 1, most, ", the candidates") for n in counts.values()]
         found = design.grown(*each)
     else:
         found = design.reaching(_accuracy(accuracy, everything, len(q)))
     ways, home = _drives(machine, q)
-    places = np.tile(ways, (len(kinds), 1))
-    order, travel = short_tour(places[found], home)
-    found = found[order]
-    unweighted = design.predicted(found), travel
+    places, start = _by_payload(ways, home, len(kinds), len(loads))
+    found = found[short_tour(places[found], start)[0]]
+    unweighted = design.predicted(found), tour_length(np.vstack([home, ways[found % len(q)]]))
     if weight:
-        most = np.inf if accuracy is None else max(accuracy, unweighted[0])
-        found, travel = with_travel(design, found, places, home, weight, most)
+        least = np.inf if accuracy is None else max(accuracy, unweighted[0])
+        found = with_travel(design, found, places, start, weight, least)[0]
     chosen = found % len(q)
     return Plan(
         robot=robot,
@@ -301,7 +320,7 @@ def plan_poses(
         all_candidates=everything,
         left_out=offered - len(inside),
         parameters=parameters.names,
-        travel=travel,
+        travel=tour_length(np.vstack([home, ways[chosen]])),
         own_frame=own_frame,
         kinds=tuple(_name(kinds[sort[i]]) for i in found),
         target={_name(each): place for each, place in points.items()},
@@ -309,6 +328,8 @@ def plan_poses(
         predicted_unweighted=unweighted[0],
         travel_unweighted=unweighted[1],
         unpulled=unpulled,
+        stderr=design.deviations(found) * parameters.scale,
+        load=_carried(loads, found // len(q) % len(loads)),
     )
 
 
@@ -375,6 +396,22 @@ def _drives(robot: Calibratable, q: FloatArray) -> tuple[FloatArray, FloatArray]
     return drives[1:], drives[0]
 
 
+def _by_payload(
+    ways: FloatArray, home: FloatArray, kinds: int, loads: int
+) -> tuple[FloatArray, FloatArray]:
+    """Places of all candidates for a tour and its start, far apart where payloads differ."""
+    apart = 2.0 * float(np.abs(ways - home).max(initial=1.0))
+    of_load = np.repeat(np.arange(loads), len(ways)) * apart
+    places = np.hstack([np.tile(ways, (loads, 1)), of_load[:, None]])
+    return np.tile(places, (kinds, 1)), np.append(home, 0.0)
+
+
+def _carried(loads: Sequence[Load | None], which: IntArray) -> Load | None:
+    """The loads of a plan's poses, (count,) each."""
+    each = [load.rows(()) for load in loads if load is not None]
+    return Load.of_rows(np.array(each)[which]) if each else None
+
+
 def _way(travel: float) -> str:
     return f"{travel:.4g}" if travel < 1e4 else f"{travel:.0f}"
 
@@ -405,7 +442,7 @@ def _aims(robot: Calibratable, targets: ArrayLike) -> tuple[FloatArray, FloatArr
 
 
 def _within_limits(
-    robot: Calibratable, candidates: ArrayLike
+    robot: Calibratable, candidates: ArrayLike, loads: Sequence[Load | None]
 ) -> tuple[FloatArray, FloatArray, IntArray, int, int]:
     """Poses and actuators of the candidates that can be measured, which ones, and of how many.
 
@@ -421,6 +458,9 @@ def _within_limits(
         good[good] = held
     # `identify` starts from home, too, and must find them
     good[good] = np.abs(robot.forward(q[good]).pose - there[good]).max(axis=1) < _FOUND
+    for load in loads:
+        if load is not None:  # beside a singularity a machine gives way
+            good[good] = under(robot, load).forward(q[good]).ok
     inside = np.flatnonzero(good)
     if not len(inside):
         raise ArgumentError(

@@ -17,7 +17,8 @@ from pkmcal.estimation.free_parameters import parameters
 from pkmcal.estimation.identifiability import as_sum, sparse_basis
 from pkmcal.estimation.parameters import Asked, Parameters, Prior
 from pkmcal.estimation.starts import with_starts
-from pkmcal.exceptions import ArgumentError
+from pkmcal.exceptions import ArgumentError, ArgumentTypeError
+from pkmcal.geometry.carried import Load
 from pkmcal.kinematics import pose_steps
 from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.kinematics.robot import Robot
@@ -42,6 +43,7 @@ def planned(
     several: FloatArray | None,
     noise: float | Tracker,
     actuator_noise: ArrayLike | None,
+    load: Load | None = None,
 ) -> Measurements:
     """What would be measured, the rows of a pose one after another; `several` are targets."""
     if isinstance(robot, Robot) and robot.model.balanced_load is not None:
@@ -69,17 +71,19 @@ def planned(
                 f"kind: poses of {robot.name} follow from its actuators, which alone say nothing of"
                 " its geometry: measure something else"
             )
-        measured = Measurements(rows, None, instrument, actuator_units=robot.actuator_units)
+        measured = Measurements(
+            rows, None, instrument, actuator_units=robot.actuator_units, load=load
+        )
     else:
         places = None if several is None else np.tile(several, (len(q), 1))
-        measured = VirtualMachine(robot, noise).measure(rows, instrument, places)
+        measured = VirtualMachine(robot, noise).measure(rows, instrument, places, load=load)
         if measured.sigma is None:
             raise ArgumentError(
                 f"noise must be above 0, found {noise}: without it any poses will do"
             )
         # a frame laid through noise is tilted by as much as heights can tell, and what is never
         # seen of a level machine would seem to be
-        exact = VirtualMachine(robot, 0.0).measure(rows, instrument, places)
+        exact = VirtualMachine(robot, 0.0).measure(rows, instrument, places, load=load)
         measured = replace(measured, values=exact.values)
         if several is not None:
             index = np.tile(np.arange(count), len(q))
@@ -87,6 +91,36 @@ def planned(
     if actuator_noise is None:
         return measured
     return replace(measured, actuator_sigma=np.asarray(actuator_noise, dtype=np.float64))
+
+
+def stated_loads(robot: Calibratable, payloads: Sequence[float | Load]) -> list[Load | None]:
+    """What the machine is to carry; `[None]` where that is what its file states.
+
+    Raises
+    ------
+    ValueError, TypeError
+        Nothing of the machine yields, no payload, a load of several rows.
+    """
+    if isinstance(payloads, int | float | Load) or not all(
+        isinstance(each, int | float | np.number | Load) for each in payloads
+    ):
+        raise ArgumentTypeError(
+            f"payloads must be several masses in kg, or Loads, such as [0, 100]; found {payloads!r}"
+        )
+    found = [each if isinstance(each, Load) else Load(mass=each) for each in payloads]
+    for each in found:
+        each.rows(())
+        under(robot, each)  # refuses a machine of which nothing yields
+    return [*found] or [None]
+
+
+def under(robot: Calibratable, load: Load | None) -> Calibratable:
+    """The machine with what it is to carry."""
+    if load is None:
+        return robot
+    if not isinstance(robot, Robot):
+        raise ArgumentError(f"payloads: {robot.name} is an arm, which has no limbs that yield")
+    return robot.under(load)
 
 
 def equations_of(
@@ -116,7 +150,7 @@ def information(equations: Equations, poses: int) -> FloatArray:
     rows *= equations.parameters.scale
     block_of_row = equations.blocks.block_of_row
     first = np.arange(0, len(block_of_row), len(block_of_row) // poses)
-    if not equations.closures.unknowns:  # rows are blocks, in their order
+    if not equations.machines.unknowns:  # rows are blocks, in their order
         return rows.reshape(poses, -1, rows.shape[1])
     units: FloatArray = rows.reshape(len(equations.blocks.components), -1, rows.shape[1])
     return units[block_of_row[first]]
@@ -136,10 +170,13 @@ def design_of(
     aims: FloatArray,
     aims_at: FloatArray,
     criterion: Criterion,
+    loads: Sequence[Load | None] = (None,),
 ) -> tuple[Design, bool]:
-    """The design, and whether its errors are in the machine's own frame."""
+    """The design, and whether its errors, under each load, are in the machine's own frame."""
     k = len(chosen.places)
-    twists = chosen.robot.error_twists(aims, aims_at)
+    machines = [under(chosen.robot, load) for load in loads]
+    twists = np.concatenate([machine.error_twists(aims, aims_at) for machine in machines])
+    aims = np.tile(aims, (len(loads), 1))
     by_geometry = twists[:, 3:, chosen.places] * chosen.scale[:k]
     aimed = np.concatenate([by_geometry, np.zeros((len(aims), 3, len(chosen) - k))], axis=2)
     if not np.isfinite(blocks).all() or not np.isfinite(aimed).all():

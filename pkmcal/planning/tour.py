@@ -59,3 +59,8 @@ def short_tour(places: FloatArray, start: FloatArray) -> tuple[IntArray, float]:
                 shorter = True
     length = float(way[tour[:-1], tour[1:]].sum())
     return tour[1:] - 1, length
+
+
+def tour_length(way: FloatArray) -> float:
+    """The largest travel of an actuator between neighbours of a way (N, n), summed."""
+    return float(np.abs(np.diff(way, axis=0)).max(axis=1).sum())

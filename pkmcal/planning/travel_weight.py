@@ -10,7 +10,7 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray, first_largest
 from pkmcal.planning.optimal_design import Design
-from pkmcal.planning.tour import short_tour
+from pkmcal.planning.tour import short_tour, tour_length
 
 _ALIKE = 1e-6  # by which an exchange must lower the sum; less may be rounding
 # Exchanges end in a local optimum. So the best of several is taken: with the weight at once, and
@@ -54,7 +54,7 @@ def with_travel(
     found = [_descended(design, chosen, places, start, weight * way, most) for way in _WAYS]
     costs = np.array([cost for _, cost in found])
     path = found[first_largest(-costs, _ALIKE)][0]
-    return path, _length(np.vstack([start, places[path]]))
+    return path, tour_length(np.vstack([start, places[path]]))
 
 
 def _descended(
@@ -71,7 +71,7 @@ def _descended(
         cost = np.inf
         while True:
             order, length = short_tour(places[path], start)
-            if length < (1.0 - _NEAR) * _length(np.vstack([start, places[path]])):
+            if length < (1.0 - _NEAR) * tour_length(np.vstack([start, places[path]])):
                 path = path[order]
             path, least = _swept(design, path, places, start, weight, most)
             if not least < cost - _ALIKE:
@@ -94,7 +94,7 @@ def _swept(
         k = int(np.flatnonzero(path == member)[0])
         rest = np.delete(path, k)
         length, entry = _insertions(places, np.vstack([start, places[rest]]))
-        tour = _length(np.vstack([start, places[path]]))
+        tour = tour_length(np.vstack([start, places[path]]))
         deviations = design.exchanged_for(path, member)
         now = deviations[member] + weight * float(np.log(max(tour, np.finfo(float).tiny)))
         deviations[np.exp(deviations) > most] = np.inf
@@ -121,7 +121,3 @@ def _insertions(places: FloatArray, way: FloatArray) -> tuple[FloatArray, IntArr
         shorter = total + more < (1.0 - _NEAR) * length
         length[shorter], entry[shorter] = (total + more)[shorter], k
     return length, entry
-
-
-def _length(way: FloatArray) -> float:
-    return float(np.abs(np.diff(way, axis=0)).max(axis=1).sum())

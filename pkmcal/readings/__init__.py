@@ -1,5 +1,8 @@
 """Instruments: what is read of a machine at its poses, a class for each kind of reading."""
 
+from pkmcal.readings.alignment import Sighting as Sighting
+from pkmcal.readings.alignment import frame_of_points as frame_of_points
+from pkmcal.readings.alignment import frame_of_poses as frame_of_poses
 from pkmcal.readings.angles import Angle as Angle
 from pkmcal.readings.closure import Closure as Closure
 from pkmcal.readings.distances import Between as Between

@@ -6,17 +6,74 @@ SciPy aligns one set of known points; here targets may be unknown, and 24 starts
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, IntArray, first_largest
+from pkmcal.arrays import BoolArray, FloatArray, IntArray, first_largest
 from pkmcal.core import screws
 
 _ROUNDS = 60  # of turning and shifting in turn
 _ALIKE = 1e-12  # share of squares by which turnings differ that are not equally good
 TILT = 1e-3  # rad; with tilts below it the poses do not determine where a target is
 _FLAT = 0.05  # share of the largest spread of points below which they lie in a plane, or a line
+
+
+@dataclass(frozen=True, eq=False)
+class Sighting:
+    """Readings in an unknown frame, and what the machine predicts of them in the base frame.
+
+    Attributes
+    ----------
+    values, predicted : ndarray (N, k)
+        As they were read, and as they should be in the base frame; NaN where there is none.
+    point : ndarray (N, 3)
+        Of readings with a target, the points in the base frame, where targets are said to be.
+    turn : ndarray (N, 3, 3)
+        From the platform's axes to those of the base.
+    target : ndarray of int (N,)
+        The first parameter of the unknown target of each row; -1 where its place is known.
+    """
+
+    values: FloatArray
+    predicted: FloatArray
+    point: FloatArray
+    turn: FloatArray
+    target: IntArray
+
+
+Laid = tuple[FloatArray, Mapping[int, FloatArray]]  # a frame (6,), and shifts (3,) of targets
+
+
+def frame_of_points(seen: Sighting) -> Laid:
+    """The frame of points, some of whose targets are unknown; by heights where there is no more."""
+    values = seen.values
+    # rows of what was read at all: of a machine in a plane, say, not across it
+    never: BoolArray = np.asarray(np.isnan(values).all(axis=0))
+    read = np.isfinite(values[:, ~never]).all(axis=1)
+    if not read.any() or never[:2].all():
+        up = values[:, 2]
+        known = np.isfinite(up)
+        return of_heights(up[known], seen.point[known]) if known.any() else np.zeros(6), {}
+    firsts, target = np.unique(seen.target[read], return_inverse=True)
+    pairs = PointPairs(
+        values=np.where(never, 0.0, values)[read],
+        point=seen.point[read],
+        turn=seen.turn[read],
+        target=target.reshape(-1) - int(firsts[0] < 0),
+    )
+    frame, shifts = of_points(pairs)
+    return frame, dict(zip(firsts[firsts >= 0].tolist(), shifts, strict=True))
+
+
+def frame_of_poses(seen: Sighting) -> Laid:
+    """The frame of poses, or of orientations alone."""
+    whole = np.zeros((2, len(seen.values), 6))
+    whole[:, :, 6 - seen.values.shape[1] :] = seen.values, seen.predicted
+    whole[0, :, np.isnan(whole[0]).all(axis=0)] = 0.0  # never read, as across a plane
+    read, predicted = whole[:, np.isfinite(whole[0]).all(axis=1)]
+    return of_poses(read, predicted) if len(read) else np.zeros(6), {}
 
 
 @dataclass(frozen=True, eq=False)

@@ -37,6 +37,7 @@ class Angle(Reading):
     joint: str | None = None
 
     name = "angle"
+    stated = ("joint",)
     components = (("angle", "rad"),)
     planned = False  # a joint has to be named
     starts_by_pose = True
@@ -60,6 +61,10 @@ class Angle(Reading):
                 found[rows] = joint_angles.angles(machine, m.actuators[rows], pose, joint, state)
         values = found[:, None] - np.broadcast_to(zero, (len(m), 1))
         return Predicted(values, by_twist, {"zero": np.full((len(m), 1, 1), -1.0)})
+
+    def follows_pose(self, machine: Any) -> bool:
+        """Of a pulley's swivel it does; joints of a chain are where that closes."""
+        return joint_angles.follows_pose(machine, str(self.joint))
 
     def by_geometry(self, at: At, places: IntArray) -> FloatArray | None:
         """Derivative of the angle to numbers of the geometry at a held pose."""

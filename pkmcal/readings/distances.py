@@ -22,6 +22,7 @@ from pkmcal.readings.unknowns import Dependence, Found, Start, always, point
 
 DISTANCE: Components = (("distance", "mm"),)
 ZERO = np.zeros(1)
+_WAY = "to.approach"  # columns of files: from where actuators came to the second place
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,16 +137,25 @@ class Between(Reading):
     ----------
     other : (N, n) array
         The actuators at the second place, mm or rad.
+    approach : scalar, (n,) or (N, n) array, optional
+        From where each actuator came to the second place, for drives with backlash: 1 where its
+        reading had grown, -1 where it had fallen, 0 where that is not known. None: the machine was
+        driven there from the first place.
     """
 
     other: ArrayLike | None = None
+    approach: ArrayLike | None = None
 
     name = "between"
     components = DISTANCE
     point = "platform"
     nouns = ("distance between two places", "distances between two places")
     planned = False
-    per_row = ("other",)
+    per_row = ("other", "approach")
+
+    def follows_pose(self, machine: Any) -> bool:
+        """It follows from two."""
+        return False
 
     def predict(self, at: At, target: FloatArray = ORIGIN, **numbers: FloatArray) -> Predicted:
         """Distance of the two places of `target` (N, 3) of the platform, mm."""
@@ -178,7 +188,19 @@ class Between(Reading):
             raise ArgumentError(
                 f"other must have shape {actuators.shape}, as actuators; found {other.shape}"
             )
-        return self.with_fields({"other": other}), values
+        fields = {"other": other}
+        if self.approach is not None:
+            fields["approach"] = rows.signs("approach", self.approach, actuators.shape)
+        return self.with_fields(fields), values
+
+    def approached(self, actuators: FloatArray, first: FloatArray | None) -> FloatArray | None:
+        """As stated, or from the first place."""
+        if self.approach is not None:
+            return np.asarray(self.approach, dtype=np.float64)
+        if first is None:
+            return None
+        moved = np.sign(np.asarray(self.other) - actuators)
+        return np.where(moved == 0.0, first, moved)
 
     def found_in(self, table: Table) -> list[str]:
         """A column of distances beside actuators of a second place."""
@@ -186,8 +208,10 @@ class Between(Reading):
         return ["distance"] if "distance" in table.columns and second else []
 
     def names(self, table: Table) -> set[str]:
-        """Distances, and ``to.q1`` … for the actuators that are there."""
-        return {"distance", *(f"to.{name}" for name in table.columns if name[:1] == "q")}
+        """Distances, and ``to.q1`` …, ``to.approach.q1`` … for the actuators that are there."""
+        names = [name for name in table.columns if name[:1] == "q"]
+        ways = [_WAY, *(f"{_WAY}.{name}" for name in names)]
+        return {"distance", *(f"to.{name}" for name in names), *ways}
 
     def read(self, table: Table, units: Sequence[str]) -> Between:
         """The actuators at the second place, in the units of those at the first; steps, too."""
@@ -202,11 +226,19 @@ class Between(Reading):
             if quantity != of_first or (quantity == "count" and counts[0] != counts[1]):
                 raise table.header_error(f"columns {name!r} and {second!r} have unlike units")
             columns.append(values)
-        return replace(self, other=np.stack(columns, axis=1))
+        ways = [f"{_WAY}.{name}" for name in names]
+        of_all = [_WAY] * len(names) if _WAY in table.columns else ways
+        approach = None
+        if any(way in table.columns for way in of_all):
+            table.require(of_all)
+            approach = np.stack([table.integers(way) for way in of_all], axis=1)
+        return replace(self, other=np.stack(columns, axis=1), approach=approach)
 
     def columns(self, units: Sequence[str]) -> Iterator[WrittenColumn]:
         """The actuators at the second place."""
         yield from numbered("to", units, np.asarray(self.other))
+        if self.approach is not None:
+            yield from numbered(_WAY, "", np.asarray(self.approach).astype(np.int64))
 
 
 def distances(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.core import instruments
 from pkmcal.files.column_names import is_turned
 from pkmcal.files.csv_table import Table
+from pkmcal.readings.alignment import Laid, Sighting, frame_of_points, of_heights
 from pkmcal.readings.measured import InFit, Measured
 from pkmcal.readings.reading import At, Predicted, Reading
 from pkmcal.readings.unknowns import POINT, Dependence, point
@@ -26,6 +28,8 @@ class Position(Reading):
     name = "position"
     components = POINT
     framed = True
+    frame_order: ClassVar[int] = 0
+    is_place: ClassVar[bool] = True
     point = "platform"
 
     def predict(self, at: At, target: FloatArray = ORIGIN, **numbers: FloatArray) -> Predicted:
@@ -35,6 +39,10 @@ class Position(Reading):
     def dependences(self, data: InFit) -> Iterator[Dependence]:
         """The target."""
         yield point(data.measured, "target", "target", data.unknown_target)
+
+    def frame(self, seen: Sighting) -> Laid:
+        """The frame in which the points are nearest, with unknown targets placed."""
+        return frame_of_points(seen)
 
     def arguments(self, m: Measured) -> dict[str, FloatArray]:
         """The targets as stated."""
@@ -52,11 +60,17 @@ class Height(Position):
 
     name = "height"
     components = (("z", "mm"),)
+    frame_order = 2
+    is_place = False
     by_firmware = True
 
     def predict(self, at: At, target: FloatArray = ORIGIN, **numbers: FloatArray) -> Predicted:
         """Height of the point `target` (N, 3) of the platform, mm."""
         return some_components(points(at.pose, target, at.frame, at.origin), np.array([[2]]))
+
+    def frame(self, seen: Sighting) -> Laid:
+        """The height and lean that agree with the heights best."""
+        return of_heights(seen.values, seen.point), {}
 
     def found_in(self, table: Table) -> list[str]:
         """Column z alone."""

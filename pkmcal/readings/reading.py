@@ -12,16 +12,17 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Literal, Protocol, TypeVar
+from typing import Any, ClassVar, Literal, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pkmcal.arrays import FloatArray, IntArray, TextArray, lots, mm_per_unit
+from pkmcal.arrays import FloatArray, IntArray, lots, mm_per_unit
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.csv_table import Table
 from pkmcal.files.csv_writer import WrittenColumn
 from pkmcal.readings import orientation, rows
+from pkmcal.readings.alignment import Laid, Sighting
 from pkmcal.readings.measured import InFit, Measured
 from pkmcal.readings.unknowns import Dependence, Found
 
@@ -66,6 +67,26 @@ class Predicted:
     by: Mapping[str, FloatArray] = field(default_factory=dict)
     by_frame: FloatArray | None = None
     by_other: FloatArray | None = None
+
+
+class Family(NamedTuple):
+    """Components of a reading that have one unit.
+
+    Attributes
+    ----------
+    unit : str
+        Their unit.
+    columns : tuple of int
+        Which they are.
+    """
+
+    unit: str
+    columns: tuple[int, ...] = ()
+
+    @property
+    def noun(self) -> str:
+        """What they are called."""
+        return {"mm": "lengths", "rad": "angles"}.get(self.unit, f"readings in {self.unit}")
 
 
 def joined(parts: Sequence[Predicted], rows_of: Sequence[IntArray]) -> Predicted:
@@ -136,6 +157,10 @@ class Reading:
         The first of three components that are an orientation and differ by a rotation vector.
     framed : bool
         Whether the readings are in the frame of an instrument.
+    frame_order : int
+        Of readings in one frame, whose place that frame where a search begins: the least number's.
+    is_place : bool
+        Whether its first components are x, y and z of the platform, or of a point of it.
     point : str
         Which body `Measurements.target` is a point of: the "platform", the "base", or "", neither.
     nouns : (str, str) or None
@@ -155,12 +180,17 @@ class Reading:
         several targets. Their columns are ``NAME.x``, ``.y`` and ``.z``.
     truth : tuple of str
         Fields that a simulation is told and nobody who measures knows.
+    stated : tuple of str
+        Other fields that its own columns or their headings state. What is in none of these lists
+        is one number or word for all rows, and has a column ``KIND.FIELD`` in files.
     """
 
     name: ClassVar[str] = ""
     components: ClassVar[Components] = ()
     turning: ClassVar[int | None] = None
     framed: ClassVar[bool] = False
+    frame_order: ClassVar[int] = 9
+    is_place: ClassVar[bool] = False
     point: ClassVar[Literal["platform", "base", ""]] = ""
     nouns: ClassVar[tuple[str, str] | None] = None
     by_firmware: ClassVar[bool] = False
@@ -170,6 +200,7 @@ class Reading:
     labels: ClassVar[tuple[str, ...]] = ()
     own_points: ClassVar[tuple[str, ...]] = ()
     truth: ClassVar[tuple[str, ...]] = ()
+    stated: ClassVar[tuple[str, ...]] = ()
 
     # the model ------------------------------------------------------------------------------------
 
@@ -195,6 +226,17 @@ class Reading:
 
     def starts(self, machine: Any, sets: Sets, found: Found) -> None:
         """Add to `found` where the search starts for unknowns that have no present value."""
+
+    def frame(self, seen: Sighting) -> Laid:
+        """Place the frame where its search begins: the base in it, and shifts of unknown targets.
+
+        By default where the base is, with its axes.
+        """
+        return np.zeros(6), {}
+
+    def follows_pose(self, machine: Any) -> bool:
+        """Whether it follows from one pose of the platform, wherever the actuators are."""
+        return True
 
     def arguments(self, m: Measured) -> dict[str, FloatArray]:
         """Give the arguments of `predict` for an instrument whose truth is stated."""
@@ -252,20 +294,22 @@ class Reading:
                 )
         return mm_per_unit(self.units, length)
 
-    def arc(self, m: Measured, length: float) -> float:
-        """What takes its misfit to mm: where angles alone are read, the machine's length."""
-        if "mm" in self.units:
-            return 1.0
-        return float(np.median(self.mm(m, length))) if self.units else length
+    @property
+    def families(self) -> tuple[Family, ...]:
+        """Its components by their unit: what may be wrong by itself, lengths or angles, say."""
+        return tuple(
+            Family(unit, tuple(k for k, each in enumerate(self.units) if each == unit))
+            for unit in dict.fromkeys(self.units)
+        )
+
+    def arcs(self, m: Measured, length: float) -> FloatArray:
+        """What takes a residual of each component to mm (k,): one number for all rows."""
+        each = self.mm(m, length)
+        return np.asarray(np.median(each, axis=0) if each.ndim > 1 else each, dtype=np.float64)
 
     def distance_per_point(self, residual: FloatArray, m: Measured, length: float) -> FloatArray:
-        """How far off each measured point is, mm (N,); of poses their position.
-
-        Where no lengths were read, what the residuals are worth at a characteristic length, mm.
-        """
-        if "mm" in self.units:
-            residual = residual[:, np.array(self.units) == "mm"]
-        elif self.units:
+        """How far off each measured point is, mm (N,); angles count as their arc."""
+        if self.units:
             residual = residual * self.mm(m, length)
         off: FloatArray = np.linalg.norm(residual, axis=1)
         return off
@@ -320,9 +364,20 @@ class Reading:
         defaults = {each.name: each.default for each in dataclasses.fields(self)}  # type: ignore[arg-type]
         return self.with_fields({name: defaults[name] for name in self.truth})
 
-    def subject(self, m: Measured) -> TextArray | None:
-        """What each row is of beside its target, (N,); None: all rows are of one thing."""
-        return None
+    def subject(self, rows: int) -> IntArray:
+        """Which of several things each of `rows` rows is of beside its target, (N,), from 0.
+
+        Rows differ where a field with an entry for every row does, a second place, an attachment:
+        they repeat no other then.
+        """
+        points = [name for name in self.own_points if np.ndim(getattr(self, name)) == 2]
+        found = np.zeros(rows, dtype=np.intp)
+        for name in (*self.per_row, *points):
+            given = getattr(self, name)
+            if given is not None and len(given) == rows:
+                own = np.unique(np.asarray(given), axis=0, return_inverse=True)[1].reshape(-1)
+                found = found * (int(own.max(initial=0)) + 1) + own
+        return np.unique(found, return_inverse=True)[1].reshape(-1)
 
     def with_fields(self: Own, changes: Mapping[str, Any]) -> Own:
         """The instrument with other fields; arrays become read-only."""
@@ -332,6 +387,13 @@ class Reading:
             if isinstance(value, np.ndarray):
                 value.setflags(write=False)
         return dataclasses.replace(self, **changes)  # type: ignore[type-var]
+
+    def approached(self, actuators: FloatArray, first: FloatArray | None) -> FloatArray | None:
+        """From where actuators (N, n) came to the second place of each row, (N, n).
+
+        `first` is from where they came to the first; None: not known.
+        """
+        return first
 
     # words ----------------------------------------------------------------------------------------
 

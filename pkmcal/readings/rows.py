@@ -24,6 +24,26 @@ def numbers(name: str, given: ArrayLike, blank: bool = False) -> FloatArray:
     return array
 
 
+def of_actuators(
+    name: str, given: ArrayLike, shape: tuple[int, ...], blank: bool = False
+) -> FloatArray:
+    """Numbers of each actuator (N, n), given for all, for each or for each row."""
+    found = numbers(name, given, blank)
+    if found.shape not in ((), shape[1:], shape):
+        raise ArgumentError(
+            f"{name} must be one number or have shape {shape[1:]} or {shape}; found {found.shape}"
+        )
+    return np.array(np.broadcast_to(found, shape))
+
+
+def signs(name: str, given: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
+    """1, -1 or 0 of each actuator (N, n), likewise."""
+    found = of_actuators(name, given, shape)
+    if not np.isin(found, (-1.0, 0.0, 1.0)).all():
+        raise ArgumentError(f"{name} must be 1, -1 or 0 for each actuator")
+    return found
+
+
 def is_name(text: str) -> bool:
     """Whether a name can be written and read: on one line, not empty, not too long."""
     return 0 < len(text) <= LONGEST_NAME and text == " ".join(text.split())

@@ -75,6 +75,7 @@ class Touch(Reading):
     planned = False
     per_row = ("touched",)
     truth = ("places",)
+    stated = ("artefact", "distances")
 
     def __post_init__(self) -> None:
         word("artefact", self.artefact, TOUCHES)
@@ -207,6 +208,7 @@ class TouchDistance(Reading):
     distances: TouchDistances = ()
 
     name = "touch-distance"
+    stated = ("distances",)
     planned = False
     components = DISTANCE
 

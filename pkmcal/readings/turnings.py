@@ -15,7 +15,14 @@ from pkmcal.core.poses import compose
 from pkmcal.files.column_names import is_turned, orientation_in
 from pkmcal.files.csv_table import Table
 from pkmcal.readings import orientation
-from pkmcal.readings.alignment import angles_of, nearest_rotations, of_directions
+from pkmcal.readings.alignment import (
+    Laid,
+    Sighting,
+    angles_of,
+    frame_of_poses,
+    nearest_rotations,
+    of_directions,
+)
 from pkmcal.readings.measured import InFit, Measured
 from pkmcal.readings.points import PLACE_TITLE, points
 from pkmcal.readings.reading import At, Predicted, Reading, Sets
@@ -35,6 +42,8 @@ class Pose(Reading):
     components = PLACE
     turning = 3
     framed = True
+    frame_order = 1
+    is_place = True
 
     def predict(
         self,
@@ -54,6 +63,10 @@ class Pose(Reading):
     def starts(self, machine: Any, sets: Sets, found: Found) -> None:
         """The tool at the platform; `estimation.first_frames` aligns it together with frames."""
         found["tool", ""] = Start(tuple(range(6)), np.zeros(6))
+
+    def frame(self, seen: Sighting) -> Laid:
+        """The frame in which the poses are nearest."""
+        return frame_of_poses(seen)
 
     def found_in(self, table: Table) -> list[str]:
         """A place and an orientation in any form."""
@@ -81,6 +94,7 @@ class Orientation(Reading):
     components = ANGLES
     turning: ClassVar[int | None] = 0
     framed = True
+    frame_order: ClassVar[int] = 3
     starts_by_pose = True
     truth = ("mounting",)
 
@@ -96,6 +110,10 @@ class Orientation(Reading):
     def starts(self, machine: Any, sets: Sets, found: Found) -> None:
         """The mounting that fits the nominal machine best."""
         _mounted(sets, found, _of_orientations)
+
+    def frame(self, seen: Sighting) -> Laid:
+        """The frame in which the orientations are nearest."""
+        return frame_of_poses(seen)
 
     def arguments(self, m: Measured) -> dict[str, FloatArray]:
         """The mounting as stated."""
@@ -120,6 +138,11 @@ class Tilt(Orientation):
     name = "tilt"
     components = (("tilt1", "rad"), ("tilt2", "rad"))
     turning = None
+    frame_order = 4
+
+    def frame(self, seen: Sighting) -> Laid:
+        """As level as the robot file says."""
+        return np.zeros(6), {}
 
     def predict(self, at: At, mounting: FloatArray = _ORIGIN, **numbers: FloatArray) -> Predicted:
         """Tilts of a sensor at `mounting` (3,) or (N, 3) on the platform, rad."""

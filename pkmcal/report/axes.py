@@ -29,7 +29,7 @@ def axes(found: Identification) -> list[dict[str, Any]]:
     before, after = list[FloatArray](), list[FloatArray]()
     poses = list[IntArray]()
     for i, measured in enumerate(equations.table.sets):
-        if measured.kind not in ("position", "pose"):
+        if not measured.instrument.is_place:
             continue
         rows = equations.table.rows[equations.table.set_of == i]
         good = np.isfinite(measured.values).all(axis=1) & ~np.isin(rows, found.outliers)
@@ -38,7 +38,7 @@ def axes(found: Identification) -> list[dict[str, Any]]:
         if not good.any():  # partly read rows alone
             continue
         first, last = (
-            _deviations(at.residuals[i], by_twist[i], run, measured.kind)
+            _deviations(at.residuals[i], by_twist[i], run)
             for at, by_twist in zip(ends, by_twists, strict=True)
         )
         before.append(first)
@@ -82,7 +82,7 @@ def _runs(pose: IntArray, target: IntArray) -> IntArray:
     return numbered(pose, order)
 
 
-def _deviations(residual: FloatArray, by_twist: FloatArray, run: IntArray, kind: str) -> FloatArray:
+def _deviations(residual: FloatArray, by_twist: FloatArray, run: IntArray) -> FloatArray:
     """Shift and turning (R, 6) in base axes of each run, mm and rad; NaN where not seen."""
     found = []
     for k in np.unique(run[run >= 0]):
@@ -90,7 +90,7 @@ def _deviations(residual: FloatArray, by_twist: FloatArray, run: IntArray, kind:
         turn = by_twist[rows[0], :3, 3:]  # from base axes to those that were read in
         out = np.full(6, np.nan)
         out[:3] = (residual[rows, :3] @ turn).mean(axis=0)
-        if kind == "pose":
+        if residual.shape[1] == 6:
             out[3:] = residual[rows, 3:].mean(axis=0) @ turn
         else:
             design = by_twist[rows, :3].reshape(-1, 6)

@@ -13,6 +13,7 @@ from pkmcal.arrays import FloatArray, rms
 from pkmcal.calibration.identification import Identification
 from pkmcal.effects.expansion import REFERENCE, coefficients, temperatures
 from pkmcal.estimation.identifiability import listed
+from pkmcal.estimation.uncertainty import stated_variances
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files import reading
 from pkmcal.files.toml_lines import Source
@@ -26,6 +27,7 @@ _TEXTS = (
 )  # fmt: skip
 _INSTRUMENT = ("name", "serial", "certificate", "expanded", "factor")
 _TEMPERATURE = ("mean", "uncertainty", "expansion", "expansion_uncertainty")
+_NOWHERE = np.empty(0)
 _ROUNDED = 0.1  # K, to which temperatures are stated
 
 
@@ -146,7 +148,7 @@ def budget(found: Identification, stated: Statement, predicted: FloatArray) -> B
                 remark=remark,
             )
         )
-    lines += _misfit(found)
+    lines += _misfit(found, stated)
     if np.isfinite(stated.temperature):
         length = float(np.linalg.norm(found.fit.start.pose[:, :3], axis=1).max())
         mean = stated.temperature - REFERENCE
@@ -194,18 +196,44 @@ def _same_heat(found: Identification, stated: Statement) -> None:
         )
 
 
-def _misfit(found: Identification) -> list[Contribution]:
+def _shared_noise(found: Identification, stated: Statement) -> float:
+    """What residuals scatter by and U of the instrument holds already, mm: its noise.
+
+    As good as `sigma` says, and no more than the instrument's own uncertainty; 0 where one of them
+    is not stated.
+    """
+    lengths = [each for each in found.fit.equations.table.sets if "mm" in each.units]
+    variances = [stated_variances(each) for each in lengths]
+    known = [np.mean(each) for each in variances if each is not None]
+    if not known or len(known) < len(variances) or not np.isfinite(stated.expanded):
+        return 0.0
+    return min(float(np.sqrt(np.mean(known))), stated.expanded / stated.factor)
+
+
+def _beyond(scatter: float, noise: float) -> float:
+    """A scatter without the noise that it holds, mm."""
+    return float(np.sqrt(max(scatter**2 - noise**2, 0.0)))
+
+
+def _of_noise(noise: float) -> str:
+    """Whether a scatter holds the noise of the instrument, in words."""
+    if noise:
+        return f"less the noise of the instrument, {noise:.3g} mm, which its U holds"
+    return "noise of the instrument included"
+
+
+def _misfit(found: Identification, stated: Statement) -> list[Contribution]:
     """What machine and model miss: repeats tell one from the other."""
-    sure = found.fit.uncertainty
+    sure, noise = found.fit.uncertainty, _shared_noise(found, stated)
     split = sure.repeats(plain=True)
     if np.isfinite(found.repeatability):
         missed = found.lack_of_fit_chance < SIGNIFICANT
         return [
             Contribution(
                 "repeatability",
-                found.repeatability,
+                _beyond(found.repeatability, noise),
                 dof=split.pure_freedom,
-                remark="scatter of repeated poses, noise of the instrument included",
+                remark=f"scatter of repeated poses, {_of_noise(noise)}",
             ),
             Contribution(
                 "lack of fit",
@@ -221,9 +249,10 @@ def _misfit(found: Identification) -> list[Contribution]:
     return [
         Contribution(
             "repeatability and lack of fit",
-            float(np.sqrt(known.mean())),
+            _beyond(float(np.sqrt(known.mean())), noise),
             dof=max(sure.fit.freedom, 0.0) or float("inf"),
-            remark="residuals; no pose was repeated, which would tell one from the other",
+            remark=f"residuals, {_of_noise(noise)}; no pose was repeated, which would tell one"
+            " from the other",
         )
     ]
 
@@ -253,11 +282,36 @@ def _expansion(found: Identification, stated: Statement) -> str:
     return ""
 
 
+def _extent(positions: FloatArray) -> dict[str, list[float]]:
+    """From where to where the tool goes along each axis, mm."""
+    if not len(positions):
+        return {}
+    ends = zip(positions.min(axis=0).tolist(), positions.max(axis=0).tolist(), strict=True)
+    return {axis: list(pair) for axis, pair in zip("xyz", ends, strict=True)}
+
+
+def _over_measured(
+    found: Identification, stated: Statement, predicted: FloatArray
+) -> dict[str, Any] | None:
+    """U over the poses that were measured, where all of it is known, and where these are."""
+    if not predicted.size:
+        return None
+    made = budget(found, stated, predicted)
+    return {
+        "expanded_uncertainty": made.expanded,
+        "coverage": made.coverage,
+        "poses": len(predicted),
+        "extent": _extent(found.fit.end.pose[:, :3]),
+    }
+
+
 def as_data(
     found: Identification,
     stated: Statement,
     predicted: FloatArray,
     positions: FloatArray,
+    where: str = "",
+    measured: FloatArray = _NOWHERE,
     left_out: int = 0,
 ) -> dict[str, Any]:
     """The certificate as JSON files hold it.
@@ -268,6 +322,10 @@ def as_data(
         As `budget` takes them.
     positions : ndarray (N, 3)
         Of the tool at the poses of `predicted`, mm.
+    where : str
+        How these poses were drawn.
+    measured : ndarray (K,)
+        What is predicted at the poses that were measured, mm.
     left_out : int
         How many poses were drawn at which nothing is predicted.
     """
@@ -290,6 +348,9 @@ def as_data(
         "instrument_stated": bool(np.isfinite(stated.expanded)),
         "standard_uncertainty": made.combined,
         "expanded_uncertainty": made.expanded,
+        "region": where,
+        "extent": _extent(positions),
+        "measured": _over_measured(found, stated, measured),
         "coverage_factor": made.factor,
         "coverage": made.coverage,
         "dof": made.dof,

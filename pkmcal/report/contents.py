@@ -77,7 +77,7 @@ def verdict(found: Identification) -> tuple[str, str]:
 
 def instrument_identified(found: Identification) -> bool:
     """Say whether a frame or points of the instrument are among the parameters."""
-    return len(found.free) > int(found.fit.parameters.geometry.stop)
+    return bool((found.columns >= found.fit.parameters.geometry.stop).any())
 
 
 def export_command(found: Identification) -> str:
@@ -151,7 +151,7 @@ def parameters(found: Identification) -> list[dict[str, Any]]:
     share = _unidentifiable_share(found)
     rows = []
     for i in range(len(found.free)):
-        prior = float(found.fit.parameters.prior[i])
+        prior = float(found.fit.parameters.prior[found.columns[i]])
         rows.append({
             "name": printable(found.free[i]),
             "unit": found.units[i],
@@ -170,8 +170,8 @@ def parameters(found: Identification) -> list[dict[str, Any]]:
 
 def _unidentifiable_share(found: Identification) -> FloatArray:
     """Return how much of each parameter lies in unidentifiable combinations, 0 to 1."""
-    share: FloatArray = np.linalg.norm(found.fit.estimate.state.measured.unidentifiable, axis=1)
-    return share
+    share = np.linalg.norm(found.fit.estimate.state.measured.unidentifiable, axis=1)
+    return np.asarray(share[found.columns])
 
 
 def _knowledge(found: Identification, i: int, prior: float, share: float) -> str:
@@ -201,7 +201,7 @@ def iso9283(found: Identification) -> list[dict[str, Any]]:
     equations = found.fit.equations
     scores = []
     for i, measured in enumerate(equations.table.sets):
-        if measured.kind not in ("position", "pose"):
+        if not measured.instrument.is_place:
             continue
         read = np.isfinite(measured.values).all(axis=1)
         odd = np.isin(equations.table.rows[equations.table.set_of == i], found.outliers)
@@ -318,6 +318,13 @@ def over_the_workspace(found: Identification) -> tuple[WorkspaceAccuracy, Slice 
     accuracy[inside] = expected(found, grid.poses[inside])
     accuracy[~np.isfinite(accuracy)] = np.nan
     return sampled, Slice((axes[0], axes[1]), (grid.values[0], grid.values[1]), accuracy)
+
+
+def over_the_measured(found: Identification) -> FloatArray:
+    """Predict the accuracy at the poses that were measured, mm; those that are known."""
+    end = found.fit.end
+    predicted = expected(found, end.actuators if isinstance(found.robot, SerialArm) else end.pose)
+    return predicted[np.isfinite(predicted)]
 
 
 def _endless(robot: Robot) -> bool:

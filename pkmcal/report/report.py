@@ -11,6 +11,7 @@ import numpy as np
 from pkmcal import display
 from pkmcal.arms.arm import SerialArm
 from pkmcal.calibration.identification import Identification
+from pkmcal.calibration.summary import WIDER
 from pkmcal.display import printable
 from pkmcal.effects.expansion import in_words
 from pkmcal.files.atomic import write_whole
@@ -85,17 +86,19 @@ def gather(
     accuracy = None if isinstance(predicted, str) else predicted[0]
     signed = None
     if stated is not None:
-        sure, where, unsure = np.empty(0), np.empty((0, 3)), 0
+        sure, places, region, unsure = np.empty(0), np.empty((0, 3)), "", 0
         if accuracy is not None:
-            sure, where = accuracy.predicted, accuracy.positions[np.isfinite(accuracy.accuracy)]
-            unsure = len(accuracy.accuracy) - len(sure)
-        signed = certificate.as_data(found, stated, sure, where, unsure)
+            sure, places = accuracy.predicted, accuracy.positions[np.isfinite(accuracy.accuracy)]
+            region, unsure = accuracy.where, len(accuracy.accuracy) - len(sure)
+        measured = contents.over_the_measured(found)
+        signed = certificate.as_data(found, stated, sure, places, region, measured, unsure)
     return {
         "state": state,
         "verdict": sentence,
         "found": found,
         "points": points,
         "worst": contents.worst(points),
+        "wider": WIDER,
         "outlier_names": row_names(found.fit.equations.prediction.datasets, found.outliers),
         "moved": contents.moved(points),
         "directions": contents.directions(found),
@@ -153,7 +156,7 @@ def html(facts: Mapping[str, Any]) -> str:
 
 def _as_data(facts: Mapping[str, Any]) -> dict[str, Any]:
     """Select what goes into the JSON file: the facts, and every attribute of the calibration."""
-    left_out = ("found", "heat", "worst", "outlier_names", "moved", "arm")
+    left_out = ("found", "heat", "worst", "outlier_names", "wider", "moved", "arm")
     kept = {name: value for name, value in facts.items() if name not in left_out}
     return kept | {"calibration": facts["found"]}
 

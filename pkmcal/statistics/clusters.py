@@ -177,17 +177,19 @@ class Sandwich:
         if not size[0] > _SPENT * size[-1]:
             return 0.0
         alpha = self.adjusted(fit.design @ (contrasts.T @ axes / np.sqrt(size)))
-        pulls = [sums(fit.design * alpha[:, i, None], fit.cluster) for i in range(k)]
-        spread = 0.0
-        for s in range(k):
-            for t in range(s, k):
-                own = [sums(alpha[:, i] * alpha[:, j], fit.cluster) for i, j in _pairs(s, t)]
-                lengths = [(pulls[i] * pulls[j]).sum(axis=1) for i, j in _pairs(s, t)]
-                cross = pulls[s].T @ pulls[t]
-                square = own[0] @ own[1] - own[0] @ lengths[1] - own[1] @ lengths[0]
-                square += own[2] @ own[2] - 2.0 * own[2] @ lengths[2]
-                square += float((cross**2).sum() + (cross * cross.T).sum())
-                spread += float(square) * (1.0 if s == t else 2.0)
+        square, cross = np.zeros((k, k)), np.zeros((k, k, *fit.back.shape[1:] * 2))
+        for rows in grouped(fit.cluster):
+            a, of, design = alpha[rows], fit.cluster[rows], fit.design[rows]
+            pulls = [sums(design * a[:, i, None], of) for i in range(k)]
+            for s in range(k):
+                for t in range(s, k):
+                    own = [sums(a[:, i] * a[:, j], of) for i, j in _pairs(s, t)]
+                    lengths = [(pulls[i] * pulls[j]).sum(axis=1) for i, j in _pairs(s, t)]
+                    square[s, t] += own[0] @ own[1] - own[0] @ lengths[1] - own[1] @ lengths[0]
+                    square[s, t] += own[2] @ own[2] - 2.0 * own[2] @ lengths[2]
+                    cross[s, t] += pulls[s].T @ pulls[t]
+        square += (cross**2 + cross * cross.transpose(0, 1, 3, 2)).sum(axis=(2, 3))
+        spread = float(np.triu(square).sum() + np.triu(square, 1).sum())
         return k * (k + 1.0) / spread if spread > 0 else 0.0
 
 

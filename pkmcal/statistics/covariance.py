@@ -46,6 +46,8 @@ class Covariance:
         Degrees of freedom of `scale`; inf where it is stated.
     components : VarianceComponents or None
         Of classes of equations whose variances were estimated apart.
+    widening : float
+        By how much deviations are wider than all that: readings in coarse steps show too little.
     """
 
     fit: LinearFit
@@ -54,6 +56,7 @@ class Covariance:
     scale: float
     scale_freedom: float
     components: VarianceComponents | None = None
+    widening: float = 1.0
 
     @cached_property
     def sandwich(self) -> Sandwich:
@@ -61,13 +64,18 @@ class Covariance:
         return Sandwich(self.fit)
 
     @cached_property
+    def by_cluster(self) -> FloatArray:
+        """Covariance (p, p) in the basis by the sandwich, as far as the data's errors make it."""
+        return self.widening**2 * self.sandwich.data
+
+    @cached_property
     def _data(self) -> FloatArray:
         """Covariance (p, p) in the basis as far as the data's errors make it."""
         if self.rule == "cluster":
-            return self.sandwich.data
+            return self.by_cluster
         if self.components is not None:
-            return self.components.covariance - self._prior
-        return self.scale**2 * (np.eye(self.fit.design.shape[1]) - self._prior)
+            return self.widening**2 * (self.components.covariance - self._prior)
+        return (self.widening * self.scale) ** 2 * (np.eye(self.fit.design.shape[1]) - self._prior)
 
     @cached_property
     def _prior(self) -> FloatArray:

@@ -14,6 +14,7 @@ from functools import cache, cached_property
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, IntArray, lots
+from pkmcal.statistics.singular_values import svd
 
 ROUNDING = 1e-9  # a singular value below this share of the largest is zero
 _WHOLE = 9  # decimals from which degrees of freedom are whole: limits on them are
@@ -141,7 +142,7 @@ def unit_basis(jacobian: FloatArray, prior: FloatArray, basis: FloatArray) -> Fl
     Arguments are those of `linear_fit`.
     """
     whole = few_rows(jacobian, prior) @ basis
-    _, singular, turned = np.linalg.svd(whole, full_matrices=False)
+    _, singular, turned = svd(whole)
     back: FloatArray = basis @ (turned.T / singular)
     return back
 
@@ -163,7 +164,10 @@ def sums(rows: FloatArray, key: IntArray) -> FloatArray:
     """Sums of rows (M, ...) that have the same key (M,), in its order."""
     order = np.argsort(key, kind="stable")
     first = np.flatnonzero(np.diff(key[order], prepend=-1))
-    total: FloatArray = np.add.reduceat(rows[order], first, axis=0)
+    in_order = rows[order]
+    if len(first) == len(order):
+        return in_order  # each key has one row
+    total: FloatArray = np.add.reduceat(in_order, first, axis=0)
     return total
 
 
@@ -192,7 +196,7 @@ def orthonormal(matrix: FloatArray | Sequence[FloatArray]) -> FloatArray:
 
     The matrix may be several side by side.
     """
-    _, singular, rows = np.linalg.svd(triangle(matrix), full_matrices=False)
+    _, singular, rows = svd(triangle(matrix))
     keep = singular > ROUNDING * singular[0]
     found: FloatArray = rows[keep].T / singular[keep]
     return found

@@ -21,6 +21,7 @@ import numpy as np
 from pkmcal.arrays import FloatArray, IntArray, lots
 from pkmcal.statistics.distributions import f_tail
 from pkmcal.statistics.linear_fit import orthonormal, sums, triangle
+from pkmcal.statistics.singular_values import svd
 
 WAVES = 3  # of each component
 LEAST = 5  # degrees of freedom beside them: below, nothing but a large jump would show
@@ -169,7 +170,7 @@ class Series:
         factor = np.zeros((0, k * WAVES))
         for rows in lots(count):
             factor = triangle(factor, columns(rows) - self._both(known, rows))
-        _, sizes, back = np.linalg.svd(factor, full_matrices=False)
+        _, sizes, back = svd(factor)
         new = sizes > _NEW * float(squares.max()) ** 0.5
         taken = int(new.sum())
         freedom = len(self.residual) - self._factor.shape[1] - taken

@@ -15,6 +15,7 @@ import numpy as np
 from pkmcal.arrays import FloatArray
 from pkmcal.statistics.distributions import f_tail, t_tail
 from pkmcal.statistics.linear_fit import ROUNDING, triangle
+from pkmcal.statistics.singular_values import svd
 
 CONTRADICTED = 0.01  # chance below which the data contradict the prior
 LEAST_FREEDOM = 5.0  # of the data alone, from which they show the noise
@@ -68,7 +69,7 @@ def data_alone(jacobian: FloatArray, data: FloatArray) -> tuple[float, float]:
     """
     factor = triangle([jacobian, data])
     n = jacobian.shape[1]
-    basis, singular, _ = np.linalg.svd(factor[:, :n], full_matrices=False)
+    basis, singular, _ = svd(factor[:, :n])
     basis = basis[:, singular > ROUNDING * singular[0]]
     rest = factor[:, n] - basis @ (basis.T @ factor[:, n])
     return float(rest @ rest), float(len(data) - basis.shape[1])
@@ -92,11 +93,11 @@ def prior_test(
     """
     basis = np.zeros((len(data), 0))
     if without.shape[1]:
-        basis, singular, _ = np.linalg.svd(without, full_matrices=False)
+        basis, singular, _ = svd(without)
         basis = basis[:, singular > ROUNDING * singular[0]]
     own = with_prior - basis @ (basis.T @ with_prior)
     left = data - basis @ (basis.T @ data)
-    turn, singular, rows = np.linalg.svd(own, full_matrices=False)
+    turn, singular, rows = svd(own)
     shown = singular > ROUNDING * float(np.linalg.norm(with_prior))
     if not shown.any():  # the other parameters take up all that the data say
         nothing = np.full(with_prior.shape[1], np.nan)

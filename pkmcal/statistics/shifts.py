@@ -3,8 +3,9 @@
 Both are described by common parameters and, one after the other, a shift of the parameter that
 lowers the sum of squares most, as long as its score test says so (G. C. Chow, Tests of equality
 between sets of coefficients in two linear regressions, Econometrica 28 (1960); tests by cluster as
-in `clusters`). Model errors shift parameters too, where the poses differ: a shift is therefore
-taken only if it is a good part of the disagreement and brings the later data nearer.
+in `clusters`). Model errors shift parameters too, where the poses differ: shifts are therefore
+sought only if the first brings the later data nearer, and named only if they are a good part of the
+disagreement. Smaller ones are estimated along, for the sizes of those that are named lean on them.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from pkmcal.statistics.clusters import Sandwich
 from pkmcal.statistics.distributions import f_tail
 from pkmcal.statistics.linear_fit import ROUNDING, LinearFit, column_basis, triangle
 from pkmcal.statistics.prior_test import data_alone
+from pkmcal.statistics.singular_values import svd
 
 _CHANCE = 0.01  # among all candidates, below which one has shifted …
 _SHARE, _FALL = 0.05, 0.03  # … if it is so much of the disagreement, and the rms falls so much
@@ -62,6 +64,14 @@ class _Trial:
     basis: FloatArray
 
 
+@dataclass(frozen=True, eq=False)
+class _Taken:
+    trial: _Trial
+    also: tuple[int, ...]
+    rms: float
+    named: bool
+
+
 def shifted(
     first: tuple[FloatArray, FloatArray, IntArray],
     later: tuple[FloatArray, FloatArray, IntArray],
@@ -90,13 +100,13 @@ def shifted(
     apart = data_alone(x1 @ basis, r1)[0] + data_alone(x2 @ basis, r2)[0]
     raw = [np.vstack([np.zeros((len(r1), d.shape[1])), x2 @ d]) for d in candidates]
     few = len(y) <= _FEW
-    taken: list[tuple[_Trial, tuple[int, ...], float]] = []
+    taken: list[_Taken] = []
     disagreement = None
     while len(taken) < most:
         left = y - common @ (common.T @ y)
         now = float(left @ left)
         disagreement = now - apart if disagreement is None else disagreement
-        done = {trial.candidate for trial, _, _ in taken}
+        done = {each.trial.candidate for each in taken}
         trials = [
             trial
             for j, columns in enumerate(raw)
@@ -110,7 +120,8 @@ def shifted(
         fall = 1.0 - np.sqrt((after[late] ** 2).sum() / max((left[late] ** 2).sum(), 1e-300))
         if not best.chance * len(trials) < _CHANCE:
             break
-        if not few and (share < _SHARE or fall < _FALL):
+        named = few or share >= _SHARE
+        if not taken and not (named and (few or fall >= _FALL)):
             break
         freedom = max(len(y) - common.shape[1] - best.basis.shape[1], 1)
         variance = (now - best.drop) / freedom
@@ -125,7 +136,8 @@ def shifted(
         common = np.column_stack([common, best.basis])
         rms = float(np.sqrt((after[late] ** 2).mean()))
         chance = min(1.0, best.chance * len(trials))
-        taken.append((_Trial(best.candidate, best.drop, chance, best.basis), also, rms))
+        trial = _Trial(best.candidate, best.drop, chance, best.basis)
+        taken.append(_Taken(trial, also, rms, named))
     return _together(taken, raw, np.vstack([x1, x2]) @ basis, y, cluster, few)
 
 
@@ -134,7 +146,7 @@ def _trial(
 ) -> _Trial | None:
     """What candidate `j` would take off the sum of squares; None if nothing new."""
     beside = columns - common @ (common.T @ columns)
-    turn, singular, _ = np.linalg.svd(beside, full_matrices=False)
+    turn, singular, _ = svd(beside)
     basis = turn[:, singular > _SAME * float(np.linalg.norm(columns))]
     freedom = len(y) - common.shape[1] - basis.shape[1]
     if not basis.shape[1] or freedom < 1:
@@ -172,20 +184,20 @@ def _best(
 
 
 def _together(
-    taken: Sequence[tuple[_Trial, tuple[int, ...], float]],
+    taken: Sequence[_Taken],
     raw: Sequence[FloatArray],
     design: FloatArray,
     y: FloatArray,
     cluster: IntArray,
     few: bool,
 ) -> list[Shift]:
-    """Sizes and deviations of the shifts, estimated together with the common parameters."""
+    """Sizes and deviations of those named, estimated with all and with the common parameters."""
     if not taken:
         return []
-    columns = [raw[trial.candidate] for trial, _, _ in taken]
+    columns = [raw[each.trial.candidate] for each in taken]
     n = design.shape[1]
     whole = np.hstack([design, *columns])
-    _, singular, rows = np.linalg.svd(triangle(whole), full_matrices=False)
+    _, singular, rows = svd(triangle(whole))
     keep = singular > ROUNDING * singular[0]
     half = rows[keep].T / singular[keep]
     basis = whole @ half
@@ -198,12 +210,12 @@ def _together(
         matrix = half @ Sandwich(fit).data @ half.T
     deviation = np.sqrt(np.maximum(np.diagonal(matrix), 0.0))
     found, start = [], n
-    for (trial, also, rms), part in zip(taken, columns, strict=True):
-        mine = slice(start, start + part.shape[1])
+    for each, part in zip(taken, columns, strict=True):
+        mine, trial = slice(start, start + part.shape[1]), each.trial
         start = mine.stop
-        found.append(
-            Shift(trial.candidate, solution[mine], deviation[mine], trial.chance, also, rms)
-        )
+        size = solution[mine], deviation[mine]
+        if each.named:
+            found.append(Shift(trial.candidate, *size, trial.chance, each.also, each.rms))
     return found
 
 

@@ -59,7 +59,7 @@ class VarianceComponents:
         variance = np.einsum("ki,ki->k", along, contrasts)
         slopes = np.einsum("ki,cij,kj->kc", along, self._slopes, along)
         spread = np.einsum("ka,ab,kb->k", slopes, self._of_variances, slopes)
-        with np.errstate(divide="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore"):  # 0 / 0 of what is held
             found: FloatArray = 2.0 * variance**2 / spread
         return found
 

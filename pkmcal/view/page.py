@@ -76,7 +76,7 @@ def places(
     """Poses (N, 6) that the page goes to one by one; of an arm joint coordinates (N, n)."""
     if isinstance(robot, SerialArm):
         q = poses
-        poses = to_pose(robot.forward(poses))
+        poses = to_pose(robot.rigid.forward(poses))  # as the page has it
     found: dict[str, Any] = {"name": name, "poses": poses.tolist()}
     return found if q is None else found | {"q": q.tolist()}
 

@@ -16,6 +16,7 @@ _SLIDES = 0.3  # of the arm's length
 
 def data(arm: SerialArm) -> dict[str, Any]:
     """All that the page needs of an arm, as JSON has it; mm and rad."""
+    given, arm = arm, arm.rigid
     turning = np.array([unit == "rad" for unit in arm.actuator_units])
     limits = arm.limits()
     start = np.clip(np.where(turning, _BENT, 0.0), limits[:, 0], limits[:, 1])
@@ -28,7 +29,7 @@ def data(arm: SerialArm) -> dict[str, Any]:
     return {
         "kind": "arm",
         "name": arm.name,
-        "what": words.of_arm(arm),
+        "what": words.of_arm(arm) + words.of_laws(given, start),
         "moved": [POSE.index(name) for name in moved],
         "size": size,
         "length": arm.length,

@@ -93,6 +93,8 @@ def _placed(
 def _chain(arm: SerialArm, q: FloatArray) -> FloatArray:
     """Base, a point on every joint's axis, and the tool."""
     at = [np.zeros(3)]
+    if arm.laws is not None:
+        q, arm = arm.laws.moved(q[None])[0], arm.rigid
     for i in range(1, arm.n_joints + 1):
         home = np.eye(4)
         home[:3, 3] = arm.points[i - 1]

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pkmcal.arms.arm import SerialArm
+from pkmcal.arrays import FloatArray
 from pkmcal.core.library import POSE
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.kinematics.robot import Robot
@@ -79,6 +80,17 @@ def of_arm(arm: SerialArm) -> str:
     kinds = Counter(arm.kinds)
     joints = " and ".join(f"{_count(n)} {kind}" for kind, n in kinds.items())
     return f"An arm of {joints} joint{'s' * (arm.n_joints > 1)}, one after the other."
+
+
+def of_laws(arm: SerialArm, theta: FloatArray) -> str:
+    """A sentence about laws of joints that a page leaves out; empty without any."""
+    if arm.laws is None:
+        return ""
+    off = np.linalg.norm((arm.forward(theta) - arm.rigid.forward(theta))[:3, 3])
+    return (
+        " What joints add to their commands is left out here: where the arm is shown at first, its"
+        f" tool is {off:.2g} mm from there."
+    )
 
 
 def _counted(robot: Robot) -> list[tuple[str, int]]:

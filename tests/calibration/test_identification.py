@@ -32,7 +32,7 @@ def results(found: pk.Identification) -> Iterator[Result]:
     yield pk.load("3r")
     yield found
     yield pk.bootstrap(found, 20)
-    yield found.fit.equations.sets[0]
+    yield found.fit.equations.table.sets[0]
     yield pk.plan_poses(hexapod, pk.sample_poses(hexapod, 20), 12, kind="pose")
 
 
@@ -73,7 +73,7 @@ def test_names_of_lmfit_and_scipy_stand_for_the_same(found: pk.Identification) -
 def test_redchi_is_the_weighted_sum_of_squares_per_degree_of_freedom(
     found: pk.Identification,
 ) -> None:
-    (measured,) = found.fit.equations.sets
+    (measured,) = found.fit.equations.table.sets
     assert measured.sigma is not None
     squares = float(((found.residuals[0] / measured.sigma) ** 2).sum())
     assert found.dof == measured.values.size - len(found.free)

@@ -263,7 +263,7 @@ def _saved(arm: pk.SerialArm, folder: Path) -> pk.SerialArm:
 @pytest.mark.parametrize(
     "call, message",
     [
-        (lambda m: identify(ARM, m, free="joint7.*"), "no joint error matches 'joint7"),
+        (lambda m: identify(ARM, m, free="joint7.*"), "no number of the arm matches 'joint7"),
         (lambda m: identify(ARM, m, free="joint2.dxx"), "did you mean 'joint2.dx'"),
         (lambda m: identify(pk.load("3r"), m), "3R arm has 3 actuators, found 6 per row"),
         (lambda m: identify(SCARA, m.select(np.arange(4))), "4 actuators, found 6"),

@@ -58,8 +58,8 @@ def assert_found(found: pk.Identification, true: Robot, frame: list[float]) -> N
     reported = np.ascontiguousarray(found.values[first : first + 6])
     ends = [instruments.seen_points(f, corners)[0] for f in (reported, np.array(frame))]
     np.testing.assert_allclose(*ends, atol=0.3)
-    off = found.robot.forward(found.fit.equations.actuators).pose
-    off -= true.forward(found.fit.equations.actuators).pose
+    off = found.robot.forward(found.fit.equations.table.actuators).pose
+    off -= true.forward(found.fit.equations.table.actuators).pose
     assert np.abs(off[:, :3]).max() < 0.3
 
 

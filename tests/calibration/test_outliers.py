@@ -9,6 +9,7 @@ import pytest
 from scipy.stats import chi2
 
 from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.fitted import outliers as odd_rows
 from pkmcal.fitted.outliers import outliers
 
 FALSE_ALARM = 0.01  # chance of naming any row of good ones
@@ -106,3 +107,35 @@ def test_rows_of_unlike_many_components_are_judged_alike() -> None:
         residual[first[row] + components[row] - 1] = length
         found = outliers(residual, design, components, np.ones(20), np.eye(1))
         assert found.tolist() == ([row] if odd else [])
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_many_gross_rows_take_few_rounds_and_are_those_of_one_at_a_time(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The time of a round grows with the rows: one round for each gross row is their product."""
+    rng = np.random.default_rng(seed)
+    rows, count = 3000, 60
+    design = rng.normal(size=(rows, 4))
+    values = rng.normal(size=rows)
+    gross = np.sort(rng.choice(rows, count, replace=False))
+    values[gross] += 10.0 ** rng.uniform(1.0, 4.0, count)
+    rounds: list[int] = []
+    median = odd_rows.median_ratio
+    monkeypatch.setattr(odd_rows, "median_ratio", lambda *given: rounds.append(1) or median(*given))
+    monkeypatch.setattr(odd_rows, "_AT_ONCE", 100)
+    assert set(gross) <= set(found := named(left(values, design), design))
+    few = len(rounds)
+    monkeypatch.setattr(odd_rows, "_AT_ONCE", rows)
+    assert named(left(values, design), design) == found
+    assert few < (len(rounds) - few) / 2
+
+
+def test_of_two_rows_that_alone_say_something_one_gross_does_not_take_both() -> None:
+    """Both are off by as much: which one is gross nobody can tell, and one of them is named."""
+    rng = np.random.default_rng(0)
+    design = np.column_stack([np.ones(4000), np.zeros(4000)])
+    design[:2, 1] = 1.0
+    values = rng.normal(size=4000)
+    values[0] += 1000.0
+    assert len(named(left(values, design), design)) == 1

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 import pkmcal as pk
 from pkmcal.calibration.identify import identify
 from pkmcal.core import instruments
-from pkmcal.diagnostics.units import other_readings
+from pkmcal.diagnostics.other_readings import other_readings
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.virtual_machine import VirtualMachine

@@ -41,7 +41,7 @@ def test_poses_that_touch_closer_together_than_before_are_said(
     after[10:] = before[10:] * 0.5  # of the other sets
     sets = [SimpleNamespace(kind=kind) for kind in kinds]
     places = np.split(np.arange(len(before)), len(kinds))
-    equations: Any = SimpleNamespace(sets=sets, pose_of=places)
+    equations: Any = SimpleNamespace(table=SimpleNamespace(sets=sets, pose_of=places))
     start, end = evaluated(before), evaluated(after)
     found = said("shrunk", equations=equations, start=start, end=end)
     alone = kinds[0] == "touch" and kinds[-1] != "distance"

@@ -94,6 +94,6 @@ def test_of_a_hexapod_with_repeats_and_a_holdout(seed: int, loss: str) -> None:
     if loss == "cauchy":
         equations, estimate = found.fit.uncertainty.equations, found.fit.estimate
         decline = estimate.state.loss.decline(estimate.residual)
-        given = estimate.residual, equations.components, estimate.weights, decline
+        given = estimate.residual, equations.blocks.components, estimate.weights, decline
         _, slope, _ = pseudo_residuals(*given, estimate.state.determined.rank)
         assert like(slope, digits[9])

@@ -664,3 +664,23 @@ def test_as_good_as_the_cramer_rao_bound_in_each_session_and_honest(
     assert np.sqrt(np.mean(of_common)) == pytest.approx(1.0, abs=within)
     assert np.sqrt(np.mean(of_own)) == pytest.approx(1.0, abs=within)
     assert covered[0] <= np.mean(inside) <= covered[1]
+
+
+def test_sizes_of_what_moved_allow_for_smaller_shifts_beside_it(hexapod: pk.Robot) -> None:
+    """One leg slipped far, all the others a little: each interval holds what that leg did."""
+    names = hexapod.geometry.match("offset*")
+    inside = []
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        sets = []
+        for slips in (np.zeros(6), np.array([0.06, -0.05, 0.04, -0.06, 1.5, 0.4])):
+            true = hexapod.replace(dict(zip(names, slips, strict=True)))
+            q = hexapod.inverse(hexapod_poses(hexapod, 60, rng))
+            seen = true.forward(q).pose[:, :3]
+            sets.append(pk.Measurements(q, seen + rng.normal(0, 0.02, seen.shape), sigma=0.02))
+        found = pk.identify(hexapod, sets[0], "offset*", holdout=sets[1])
+        moved = {each.names[0]: each for each in found.moved if len(each.names) == 1}
+        for name, size in (("offset5", 1.5), ("offset6", 0.4)):
+            assert name in moved
+            inside.append(abs(moved[name].shift[0] - size) < 2.0 * moved[name].stderr[0])
+    assert np.mean(inside) > 0.8

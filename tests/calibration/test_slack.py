@@ -111,7 +111,9 @@ def test_amounts_are_in_mm_and_said(eight: pk.Robot) -> None:
     found = fitted(eight, q, "drop")
     pose = found.fit.estimate.evaluation.pose[:, :3]
     corners = np.array([[found.robot.geometry[f"base{i}.{c}"] for c in "xyz"] for i in range(1, 9)])
-    order = [int(np.argmin(np.abs(found.fit.equations.actuators - row).sum(axis=1))) for row in q]
+    order = [
+        int(np.argmin(np.abs(found.fit.equations.table.actuators - row).sum(axis=1))) for row in q
+    ]
     for each in found.slack:
         (row,), (actuator,) = each.rows, each.actuators
         way = np.linalg.norm(pose[order[row]] - corners[actuator - 1])

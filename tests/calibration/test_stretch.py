@@ -184,7 +184,7 @@ def test_load_cells_and_cables_alone_find_anchors_and_stretch(four: pk.Robot) ->
     found, true = by_cells(four, 3, MOVED)
     assert found.rank == len(found.free) == 7
     assert np.abs((found.values - true) / found.stderr).max() < 4.5
-    read = found.fit.equations.sets[0].actuators
+    read = found.fit.equations.table.sets[0].actuators
     blind = pk.Measurements(read, None, "closure", actuator_sigma=CABLE)
     with pytest.warns(pk.CalibrationWarning, match="times what sigma says"):
         pk.identify(four, blind, [*MOVED])

@@ -15,8 +15,9 @@ from pkmcal.diagnostics.drift import Drift
 from pkmcal.diagnostics.measuring_order import MeasuringOrder
 from pkmcal.diagnostics.robust_check import RobustCheck
 from pkmcal.diagnostics.verdict import diagnose
-from pkmcal.fitted.distances import Distances
+from pkmcal.fitted.held_points import HeldFamily
 from pkmcal.fitted.holdout import HeldOut
+from pkmcal.readings.reading import Family
 from pkmcal.statistics.holdout_test import HoldoutTest
 
 from ..simulated import hexapod_poses
@@ -29,16 +30,23 @@ def test_points_contradict_a_fit_unless_it_is_a_few_and_the_others_do_not(
     odd: tuple[int, ...], others: float, contradicts: bool
 ) -> None:
     """Twelve points, whose rms may be 1.2 times what is expected; a quarter of them is a few."""
+    tested = HoldoutTest(ratio=3.0, median_ratio=2.0, chance=1e-6, freedom=(12.0, 30.0))
+    agrees = replace(tested, median_ratio=1.1)
     held = HeldOut(
-        holdout_expected=0.5,
         holdout_off=np.append(np.ones(12), np.nan),  # one was not reached
         holdout_outliers=odd,
-        holdout_distances=Distances(rms_without_outliers=0.5 * others),
-        holdout_test=HoldoutTest(ratio=3.0, median_ratio=2.0, chance=1e-6, freedom=(12.0, 30.0)),
+        holdout_families=(of_unit("mm", 1.0, agrees), of_unit("rad", others, tested)),
     )
     assert held.holdout_contradicts == contradicts
-    agrees = HoldoutTest(ratio=3.0, median_ratio=1.1, chance=1e-6, freedom=(12.0, 30.0))
-    assert not replace(held, holdout_test=agrees).holdout_contradicts
+    assert [each.family.noun for each in held.holdout_contradicting] == ["angles"] * contradicts
+    assert not replace(held, holdout_families=(of_unit("mm", others, agrees),)).holdout_contradicts
+
+
+def of_unit(unit: str, others: float, test: HoldoutTest) -> HeldFamily:
+    """Components that are 0.5 by what is expected, and `others` times as much besides outliers."""
+    return HeldFamily(
+        family=Family(unit), rms=1.0, expected=0.5, rms_without_outliers=0.5 * others, test=test
+    )
 
 
 @pytest.fixture(scope="module")

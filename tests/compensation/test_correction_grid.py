@@ -141,3 +141,22 @@ def test_a_cubic_table_without_all_nodes_is_refused_in_words() -> None:
     failed = int(correction_grid(robot, calibrated, axes).failed.sum())
     with pytest.raises(pk.exceptions.ArgumentError, match=f"{failed} of 121 nodes have no corr"):
         correction_grid(robot, calibrated, axes, method="cubic")
+
+
+def test_a_machine_that_yields_gets_there_with_corrections_for_its_load() -> None:
+    """At the nodes exactly; without the load it misses by the sag."""
+    controller = pk.load("hexapod")
+    load = pk.Load(mass=100.0, centre=(20.0, 0.0, 60.0))
+    soft = controller.replace({"offset1": 0.3}).yielding({"offset*": 1e-4})
+    axes = {"x": np.linspace(-60, 60, 3), "z": np.linspace(820, 880, 3)}
+    found = correction_grid(controller, soft, axes, load=load)
+    nodes = np.tile(controller.home, (9, 1))
+    nodes[:, 0], nodes[:, 2] = np.repeat(axes["x"], 3), np.tile(axes["z"], 3)
+    commands = controller.inverse(nodes) + found.corrections.reshape(-1, 6)
+    reached = soft.forward(commands, guess=nodes, load=load).pose
+    assert np.abs(reached - nodes).max() < 1e-9
+    assert np.abs(soft.forward(commands, guess=nodes).pose - nodes)[:, :3].max() > 0.01
+    with pytest.raises(ValueError, match="nothing of hexapod yields"):
+        correction_grid(controller, controller, axes, load=load)
+    with pytest.raises(ValueError, match="load: mass"):
+        correction_grid(controller, soft, axes, load=pk.Load(mass=[1.0, 2.0]))

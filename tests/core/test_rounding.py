@@ -52,7 +52,7 @@ def test_a_fit_that_starts_at_the_answer_stays_there(
     robot = pk.load(name)
     found = fitted(robot, robot, kind, sigma, seed=1)
     assert found.converged and found.evaluations <= 6
-    assert found.rms <= found.rms_before + 1e-12 < 1e-10
+    assert found.rms <= found.rms_before + 3e-12 < 1e-10  # with arcs at a radius
     assert np.abs(found.values - found.start).max() < 1e-9
 
 

@@ -160,3 +160,16 @@ def test_the_page_has_the_table_of_all_checks() -> None:
 def test_every_check_says_in_one_line_what_it_looks_for() -> None:
     for each in CHECKS:
         assert 10 < len(each.about) < 90 and each.about[0].islower() and each.about[-1] != "."
+
+
+def test_a_check_alone_and_what_is_none_are_refused() -> None:
+    one = pk.CHECKS[0]
+    for wrong, message in ((one, "the check alone"), (7, "found int"), ([one, 7], "be a Check")):
+        with pytest.raises(pk.ArgumentTypeError, match=f"^checks.*{message}"):
+            verified(wrong)  # type: ignore[arg-type]
+
+
+def test_a_remedy_without_a_value_is_not_applied() -> None:
+    for before in ({}, {"fix": "offset1"}):
+        with pytest.raises(pk.ArgumentError, match=r"^fix: the remedy states no value"):
+            pk.Remedy("fix").applied(before)

@@ -187,3 +187,141 @@ def test_an_effect_that_gives_no_number_is_refused(
     robot, true, q = machine
     with pytest.raises(pk.ArgumentError, match=r"position: nothing finite .* row 0"):
         pk.identify(robot, measured(true, q, 1), free="offset*", effects=[Lost()])
+
+
+def test_a_coefficient_that_is_held_by_name_stays_where_it_starts(
+    machine: tuple[pk.Robot, pk.Robot, FloatArray],
+) -> None:
+    """As if the effect stated it: the same numbers of the machine, and no parameter."""
+
+    class Stated(Sinking):
+        def dependences(self, measured: pk.Measurements) -> Iterator[Dependence]:
+            n = len(measured)
+            yield Dependence(
+                self.argument, "sink", np.full((n, 1), RATE), {}, np.zeros(n, dtype=np.intp)
+            )
+
+    class Begun(Sinking):
+        def dependences(self, measured: pk.Measurements) -> Iterator[Dependence]:
+            (each,) = super().dependences(measured)
+            one = replace(each.estimated[""], start=np.array([RATE]))
+            yield replace(each, estimated={"": one})
+
+    robot, true, q = machine
+    rows = measured(true, q, 0)
+    stated = pk.identify(robot, rows, free="offset*", effects=[Stated()], holdout=0.25)
+    for pattern in ("sink.rate", "sink*"):
+        held = pk.identify(
+            robot, rows, free="offset*", effects=[Begun()], fix=[pattern, "offset3"], holdout=0.25
+        )
+        assert held.free == tuple(f"offset{i}" for i in (1, 2, 4, 5, 6))
+    held = pk.identify(robot, rows, free="offset*", effects=[Begun()], fix="sink*", holdout=0.25)
+    np.testing.assert_allclose(held.values, stated.values, atol=1e-9)
+    np.testing.assert_allclose(held.stderr, stated.stderr, rtol=1e-9)
+    assert held.holdout_rms == pytest.approx(stated.holdout_rms, rel=1e-9)
+    freed = pk.identify(robot, rows, free=["offset*", "sink.rate"], effects=[Sinking()])
+    assert freed.free[-1] == "sink.rate"
+    with pytest.raises(pk.ArgumentError, match=r"fix: .*'sink.rte'"):
+        pk.identify(robot, rows, free="offset*", effects=[Sinking()], fix="sink.rte")
+
+
+def test_two_numbers_of_one_name_are_refused(
+    machine: tuple[pk.Robot, pk.Robot, FloatArray],
+) -> None:
+    class Named(Sinking):
+        def dependences(self, measured: pk.Measurements) -> Iterator[Dependence]:
+            (each,) = super().dependences(measured)
+            yield replace(each, estimated={"": replace(each.estimated[""], names=("offset2",))})
+
+    robot, true, q = machine
+    with pytest.raises(pk.ArgumentError, match=r"^offset2: 2 different parameters have this name"):
+        pk.identify(robot, measured(true, q, 0), free="offset*", effects=[Named()])
+
+
+def test_what_is_no_effect_is_named(machine: tuple[pk.Robot, pk.Robot, FloatArray]) -> None:
+    class Half:
+        name = "half"
+
+        def of_rows(self, measured: Any) -> Any:
+            return self
+
+    robot, true, q = machine
+    rows = measured(true, q, 0)
+    for wrong, message in (
+        (Sinking, r"the class Sinking; an object of it is needed: Sinking\(…\)"),
+        ([Sinking], "the class Sinking"),
+        (Half(), "an object of class Half has no dependences"),
+        (7, "expected such as"),
+        (pk.readings.Position(), "expected such as"),
+        ([7], "expected such as"),
+    ):
+        with pytest.raises(pk.ArgumentTypeError, match=f"^effects: .*{message}"):
+            pk.identify(robot, rows, free="offset*", effects=wrong)  # type: ignore[arg-type]
+
+
+def test_one_effect_stands_beside_the_former_expansion(
+    machine: tuple[pk.Robot, pk.Robot, FloatArray],
+) -> None:
+    robot, true, q = machine
+    warm = replace(measured(true, q, 0), temperature=np.full(len(q), 20.0))
+    with pytest.warns(DeprecationWarning, match="expansion= will go"):
+        found = pk.identify(  # type: ignore[call-arg]
+            robot, warm, free="offset*", effects=Sinking(), expansion=11.5e-6
+        )
+    assert found.free[-1] == "sink.rate" and found.expansion
+    with pytest.raises(pk.ArgumentError, match="expansion: not beside effects='auto'"):
+        pk.identify(robot, warm, effects="auto", expansion=11.5e-6)  # type: ignore[call-arg]
+
+
+def test_what_moves_in_another_shape_is_named(
+    machine: tuple[pk.Robot, pk.Robot, FloatArray],
+) -> None:
+    robot, true, q = machine
+    rows = measured(true, q, 0)
+    n = len(q)
+    wrong: tuple[tuple[Any, str], ...] = (
+        (Moved(np.zeros((n, 3))), rf"moved of Bad: twist .* shape \({n}, 6\); found \({n}, 3\)"),
+        (Moved(np.zeros((n, 6))), "'sink' is estimated, .* gives no derivative by it"),
+        (Moved(np.zeros((n, 6)), {"sink": np.zeros((n, 6))}), r"by\['sink'\] must be an array"),
+        (Moved(np.zeros((n, 6)), {"sink": np.zeros((n, 6, 2))}), r"by\['sink'\] must be an array"),
+        (np.zeros((n, 6)), r"must return Moved\(…\); found ndarray"),
+    )
+    for returned, message in wrong:
+
+        class Bad(Sinking):
+            def of_rows(self, measured: Any) -> Any:
+                return self
+
+            def moved(self, *given: Any, found: Any = returned) -> Any:
+                return found
+
+        with pytest.raises(pk.Error, match=message):
+            pk.identify(robot, rows, free="offset*", effects=[Bad()])
+
+
+def test_a_coefficient_that_the_readings_do_not_see_is_no_calibration(
+    machine: tuple[pk.Robot, pk.Robot, FloatArray],
+) -> None:
+    """A sensor of tilts sees how the platform tips, and not how it sinks."""
+
+    class Straight(Sinking):
+        def moved(self, *given: Any) -> Moved:
+            found = super().moved(*given)
+            for each in (found.twist, found.by[self.argument]):
+                each[:, :3] = 0.0
+            return found
+
+    robot, _, q = machine
+    tilts = pk.VirtualMachine(robot, 0.0, 1, angle_noise=1e-5).measure(q, "tilt")
+    seen = pk.identify(robot, tilts, free=["base1.z", "base2.z"], effects=[Sinking()])
+    assert np.isfinite(seen.stderr[seen.free.index("sink.rate")])
+    assert "undetermined-effect" not in [each.check for each in seen.verdict.said]
+    blind = pk.identify(robot, tilts, free=["base1.z", "base2.z"], effects=[Straight()])
+    assert np.isinf(blind.stderr[blind.free.index("sink.rate")])
+    (said,) = [each for each in blind.verdict.said if each.check == "undetermined-effect"]
+    assert "sink.rate is not determined" in said.text and blind.verdict.state == "doubtful"
+    again = pk.identify(
+        robot, tilts, ["base1.z", "base2.z"], **said.remedies[0].applied({"effects": [Straight()]})
+    )
+    assert again.free[:2] == ("base1.z", "base2.z") and "sink.rate" not in again.free
+    assert again.verdict.state == "calibrated"

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from pkmcal.arrays import FloatArray
@@ -16,7 +14,7 @@ ANCHORS = np.array([[0.0, 2000], [3000, 2000], [0, 0], [3000, 0]])
 class Plane:
     """A point in the plane, of which its pose's x and y are unknown."""
 
-    def moved(self, machines: Any, states: RowStates, step: FloatArray) -> RowStates:
+    def moved(self, states: RowStates, step: FloatArray) -> RowStates:
         pose = states.pose.copy()
         pose[:, :2] += step
         return RowStates(pose, states.actuators, states.status)
@@ -41,7 +39,7 @@ def test_poses_of_gross_readings_are_at_a_minimum() -> None:
     pose[:, :2] = at
     start = RowStates(pose, read, np.zeros(count, dtype=np.int32))
     blocks = Elimination(np.repeat(np.arange(count), 4), count, 2, 3000.0)
-    found, _ = blocks.best(Plane(), None, start, system)  # type: ignore[arg-type]
+    found, _ = blocks.best(Plane(), start, system)  # type: ignore[arg-type]
     residual, slopes = (each.reshape(count, 4, -1) for each in system(found))
     pull = np.linalg.norm((slopes * residual).sum(axis=1), axis=1)
     nearest = np.linalg.norm(found.pose[:, None, :2] - ANCHORS, axis=2).min(axis=1)

@@ -76,10 +76,10 @@ def test_rows_that_stay_in_another_mode_are_named() -> None:
     equations = Equations.of([data], parameters(robot, [data], Asked("offset*")))
     start = equations.start()
     assert in_other_modes(equations, start) == []
-    others = robot.forward_all(equations.actuators[5]).poses
+    others = robot.forward_all(equations.table.actuators[5]).poses
     states = start.states.at_poses(np.array([5]), others[-1:])
     (text,) = in_other_modes(equations, equations.at(start.theta, near=states))
-    row = int(np.flatnonzero(equations.pose_of[0] == 5)[0])
+    row = int(np.flatnonzero(equations.table.pose_of[0] == 5)[0])
     assert text.startswith("1 row fits another assembly mode") and f"rows {row}" in text
 
 
@@ -110,7 +110,7 @@ def test_how_far_off_a_pose_is_counts_angles_as_their_arc(hexapod: pk.Robot) -> 
         pk.Measurements(q[2:3], at[2:3, :3] + [0.0, 0.0, 7.0], "position", sigma=0.01),
     ]
     fit = pk.identify(hexapod, sets, "offset*").fit
-    order = [int(np.argmin(np.abs(fit.equations.actuators - row).sum(axis=1))) for row in q]
+    order = [int(np.argmin(np.abs(fit.equations.table.actuators - row).sum(axis=1))) for row in q]
     pose = np.empty((6, 6))
     pose[order] = at + np.array([
         [0, 0, 0, 1e-3, 0, 0], [3, 4, 0, 0, 0, 0], [0, 0, 0, 0, 0, 2e-3], [0, 0, 0, 0, 0, 0],

@@ -24,7 +24,7 @@ def fit(request: pytest.FixtureRequest) -> pk.Identification:
 def test_exact_actuators_do_not_follow_the_unknowns_of_others(fit: pk.Identification) -> None:
     """Derivatives by parameters say how unknowns follow: of those equations alone."""
     equations, end = fit.fit.uncertainty.equations, fit.fit.estimate.evaluation
-    equations.by_parameters(end, np.ones(len(equations.unstated)))
+    equations.by_parameters(end, np.ones(len(equations.blocks.unstated)))
     exact = equations.with_exact_actuators()
     np.testing.assert_array_equal(
         exact.at(end.theta, near=end).pose, exact.at(end.theta, near=end.states).pose

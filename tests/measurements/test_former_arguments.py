@@ -96,15 +96,17 @@ def test_former_arguments_of_simulated_touches_go_together() -> None:
     same(former, new)
 
 
-def test_what_was_without_effect_stays_so() -> None:
+@pytest.mark.parametrize("name", ["mounting", "artefact", "touched"])
+def test_what_another_kind_has_is_refused_by_name(name: str) -> None:
     robot = pk.load("hexapod")
-    q = robot.inverse(robot.home)
-    plain = pk.VirtualMachine(robot, 0.01, 3).measure(q)
-    same(pk.VirtualMachine(robot, 0.01, 3).measure(q, mounting=[1, 2, 3], artefact="line"), plain)
+    with pytest.raises(pk.ArgumentError, match=f"^{name}: goes with values of kind"):
+        pk.VirtualMachine(robot, 0.01, 3).measure(robot.inverse(robot.home), **{name: "line"})
 
 
 def test_arguments_that_never_were_are_refused_by_name() -> None:
-    with pytest.raises(TypeError, match="unexpected argument 'runs'; did you mean 'run'"):
+    with pytest.raises(TypeError, match="'tempratures'; did you mean 'temperature'"):
+        pk.Measurements(Q, [1.0, 2.0], "height", tempratures=20.0)
+    with pytest.raises(TypeError, match=r"unexpected argument 'runs'$"):  # not a former one
         pk.Measurements(Q, [1.0, 2.0], "height", runs=NAMES)
     with pytest.raises(TypeError, match=r"measure.*unexpected argument 'group'"):
         pk.VirtualMachine(pk.load("hexapod")).measure(np.full(6, 880.0), group=[1])

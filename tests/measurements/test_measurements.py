@@ -12,32 +12,27 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pkmcal.exceptions import ArgumentError
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.virtual_machine import VirtualMachine
-from pkmcal.readings import Distance
+from pkmcal.readings import Distance, Height
 
-from .kinds import PUBLIC, needed, width
-
-SHAPES = {
-    "pose": (5, 6), "position": (5, 3), "height": (5,), "distance": (5,), "closure": (5, 0),
-    "between": (5,), "relative-distance": (5,), "orientation": (5, 3), "tilt": (5, 2),
-    "angle": (5,), "touch": (5, 3),
-}  # fmt: skip
+from .kinds import PUBLIC, needed, shape, width
 
 
 def make(kind: str = "position", **fields: Any) -> Measurements:
     random = np.random.default_rng(0)
     fields = needed(kind, 5, 4) | fields
     q = random.uniform(300, 500, (5, 4))
-    return Measurements(q, random.normal(size=SHAPES[kind]), kind, **fields)
+    return Measurements(q, random.normal(size=shape(kind, 5)), kind, **fields)
 
 
 @pytest.mark.parametrize("kind", PUBLIC)
 def test_every_kind_has_its_shape_components_and_units(kind: str) -> None:
     m = make(kind)
     assert len(m) == 5
-    assert m.values.shape == SHAPES[kind]
-    assert len(m.components) == len(m.units) == (SHAPES[kind] + (1,))[1]
+    assert m.values.shape == shape(kind, 5)
+    assert len(m.components) == len(m.units) == width(kind)
 
 
 def test_arrays_are_copies_that_cannot_be_changed() -> None:
@@ -407,3 +402,18 @@ def test_sessions_stay_with_their_rows() -> None:
 def test_what_is_no_session_is_refused(given: Any, message: str) -> None:
     with pytest.raises((ValueError, TypeError), match=message):
         make(session=given)
+
+
+def test_kind_and_instrument_never_contradict_each_other_silently() -> None:
+    q, values, fixed = np.full((2, 6), 400.0), [1.0, 2.0], [0, 0, 100.0]
+    m = Measurements(q, values, target=fixed, instrument=Distance([1, 2, 3]))
+    assert m.kind == "distance" and m.attachments[0].tolist() == [1, 2, 3]
+    other = dataclasses.replace(m, kind=Distance([4, 5, 6]))
+    assert other.attachments[0].tolist() == [4, 5, 6]
+    assert dataclasses.replace(m, instrument=Distance([4, 5, 6])).attachments[0, 0] == 4
+    for wrong in ({"kind": "height"}, {"instrument": Height()}):
+        with pytest.raises(ArgumentError, match=r"kind: .* contradicts the instrument"):
+            dataclasses.replace(m, **wrong)
+    for classes in ({"kind": Height}, {"instrument": Height}, {"instrument": 3}):
+        with pytest.raises(TypeError, match="must be a word or a Reading, found"):
+            Measurements(q, values, **classes)  # type: ignore[arg-type]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,10 +16,12 @@ from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.free_parameters import parameters
 from pkmcal.estimation.parameters import Asked
 from pkmcal.estimation.starts import with_starts
+from pkmcal.readings import At, Predicted
 from pkmcal.readings.registry import KINDS
 
 from ..simulated import with_errors
 from .cases import CASES, NOISE, ROWS, Case
+from .own import Spot
 
 SIGMA = 0.5  # mm; errors of the machine
 
@@ -78,8 +81,10 @@ def test_rows_take_what_the_instrument_has_of_them_along(case: Case) -> None:
     rows = [5, 2]
     part = measured.select(rows).instrument
     for name in (*part.per_row, *part.labels):
-        whole = getattr(measured.instrument, name)
-        np.testing.assert_array_equal(getattr(part, name), whole[rows])
+        whole, own = getattr(measured.instrument, name), getattr(part, name)
+        assert (whole is None) == (own is None)
+        if whole is not None:
+            np.testing.assert_array_equal(own, whole[rows])
 
 
 @EVERY
@@ -154,3 +159,36 @@ def test_a_unit_of_which_nobody_says_what_it_is_worth_is_refused_by_name() -> No
     measured = pk.VirtualMachine(robot, NOISE).measure(robot.inverse(robot.home), Plain())
     with pytest.raises(pk.ArgumentError, match="'spot' has to state in its method mm what one px"):
         pk.identify(robot, measured, free="offset*", prior=SIGMA)
+
+
+def test_what_is_predicted_in_another_shape_is_named() -> None:
+    spot = next(case for case in CASES if case.name == "spot")
+    robot = pk.load(spot.machine)
+    measured = spot.measured(robot, 10, 3, NOISE)
+    wrong = (
+        ({"values": np.zeros(10)}, r"'bad': values must be an array of shape \(10, 2\); found"),
+        ({"by_twist": np.zeros((10, 6))}, r"'bad': by_twist must be an array of shape"),
+        ({"by": {}}, "'centre' is estimated, but predict of 'bad'"),
+        ({"by": {"centre": np.zeros((10, 2))}}, r"'bad': by\['centre'\] must be an array"),
+    )
+    for changes, message in wrong:
+
+        @dataclasses.dataclass(frozen=True, eq=False)
+        class Bad(Spot):
+            name = "bad"
+            different = changes
+
+            def predict(self, at: At, **numbers: Any) -> Predicted:  # type: ignore[override]
+                return dataclasses.replace(super().predict(at, **numbers), **self.different)
+
+        other = dataclasses.replace(measured, kind=Bad())
+        with pytest.raises(pk.ArgumentError, match=message):
+            pk.identify(robot, other, free="offset*", prior=SIGMA)
+
+
+def test_only_an_object_of_a_class_of_ones_own_is_taken_for_a_file(tmp_path: Path) -> None:
+    spot = next(case for case in CASES if case.name == "spot")
+    spot.measured(pk.load(spot.machine), 5, 3, NOISE).write(tmp_path / "m.csv")
+    for wrong in ("height", Spot):
+        with pytest.raises(pk.ArgumentTypeError, match=r"^kind must be a Reading"):
+            pk.read_measurements(tmp_path / "m.csv", kind=wrong)  # type: ignore[arg-type]

@@ -40,7 +40,7 @@ def calibrate(run: Any, probe: Path) -> Callable[..., str]:
     def printed(*options: str) -> str:
         robot = ROOT / "examples" / "linear-delta" / "robot.toml"
         result = run("calibrate", robot, probe, *options)
-        assert (result.exit_code, result.stderr) == (0, "")
+        assert (result.exit_code in (0, 1), result.stderr) == (True, "")  # 1: doubtful
         return str(result.stdout)
 
     return printed

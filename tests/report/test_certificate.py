@@ -106,6 +106,43 @@ def test_the_expanded_uncertainty_holds_the_errors_of_new_arrivals(repeats: int)
     assert np.mean(within) == pytest.approx(np.mean(stated_coverage), abs=0.04)
 
 
+def budget_of(sigma: float | None, expanded: float) -> dict[str, float]:
+    """Shares of a calibration whose readings scatter by 0.01 mm, of which `sigma` is stated."""
+    robot, rng = pk.load("hexapod"), np.random.default_rng(4)
+    q = np.repeat(robot.inverse(workspaces.poses("hexapod", 12, 4)), 5, axis=0)
+    values = robot.forward(q).pose[:, :3] + rng.normal(0, NOISE, (len(q), 3))
+    found = pk.identify(robot, pk.Measurements(q, values, sigma=sigma), free="offset*")
+    stated = certificate.Statement(expanded=expanded, factor=2.0)
+    made = certificate.budget(found, stated, np.empty(0))
+    return {line.source: line.share for line in made.contributions} | {"R": found.repeatability}
+
+
+def test_noise_of_the_instrument_is_in_the_budget_once() -> None:
+    """All of the scatter is the noise that sigma states, and U of the instrument holds it."""
+    once = budget_of(NOISE, 4 * NOISE)
+    assert once["repeatability"] < 0.4 * NOISE and once["instrument"] == 2 * NOISE
+    assert once["repeatability"] == pytest.approx(
+        np.sqrt(max(once["R"] ** 2 - NOISE**2, 0.0)), abs=1e-12
+    )
+    half = budget_of(NOISE, NOISE)  # an instrument that is better than what sigma says
+    assert half["repeatability"] == pytest.approx(np.sqrt(half["R"] ** 2 - (NOISE / 2) ** 2))
+    for other in (budget_of(None, 4 * NOISE), budget_of(NOISE, np.nan)):  # how much is not known
+        assert other["repeatability"] == other["R"]
+
+
+def test_u_is_stated_over_the_measured_region_first(folder: Path, found: pk.Identification) -> None:
+    page = (folder / "report.html").read_text("utf-8")
+    assert 0 < page.index('id="measured"') < page.index('id="expanded"')
+    told = json.loads((folder / "report.json").read_text("utf-8"))["certificate"]
+    places = found.fit.end.pose[:, :3]
+    for axis, (low, high) in told["measured"]["extent"].items():
+        own = places[:, "xyz".index(axis)]
+        assert (low, high) == pytest.approx((own.min(), own.max()))
+    assert told["measured"]["expanded_uncertainty"] < told["expanded_uncertainty"]
+    assert told["region"] and set(told["extent"]) == {"x", "y", "z"}
+    assert "counter(page)" in page and f"pkmcal {pk.__version__}" in page
+
+
 def test_without_repeats_their_scatter_and_lack_of_fit_are_one_line() -> None:
     _, found = calibrated(2, repeats=1)
     made = certificate.budget(found, certificate.Statement(), np.empty(0))
@@ -134,7 +171,7 @@ def test_the_page_begins_with_what_is_stated(folder: Path, found: pk.Identificat
 
 def test_it_states_which_rows_were_left_out(stated: Path, tmp_path: Path) -> None:
     """Who signs has to see it, above the signature and not only in the report behind."""
-    measured = calibrated(2)[1].fit.equations.sets[0]
+    measured = calibrated(2)[1].fit.equations.table.sets[0]
     gross = measured.values.copy()
     gross[4] += 2.0
     rows = pk.Measurements(measured.actuators, gross)

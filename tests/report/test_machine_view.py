@@ -52,7 +52,7 @@ def found_from(kind: Any) -> Identification:
 
 def targets(found: Identification) -> np.ndarray:
     """Where the target is at each row's pose, by NumPy."""
-    pose = found.fit.end.pose[np.concatenate(found.fit.equations.pose_of)]
+    pose = found.fit.end.pose[np.concatenate(found.fit.equations.table.pose_of)]
     return np.array([p[:3] + rotation(p[3:]) @ TARGET for p in pose])
 
 

@@ -102,7 +102,7 @@ def readings(kind: str) -> Identification:
 def test_readings_of_every_kind_are_drawn(kind: str) -> None:
     found = readings(kind)
     figure = residuals(found)
-    measured = found.fit.equations.sets[0]
+    measured = found.fit.equations.table.sets[0]
     drawn = {name for panel in figure.axes for name in marks(panel)}
     assert set(measured.components) <= drawn
     labels = {panel.get_ylabel() for panel in figure.axes}

@@ -1,0 +1,117 @@
+"""How wrong numbers that a fit held may be before its uncertainty is double what it says.
+
+An error φ of held numbers moves the parameters by G K φ, with K the derivative of the whitened
+readings by them and G that of the parameters by the readings. Independent errors of deviation t add
+t² G K Kᵀ Gᵀ to the covariance C: its trace is four times that of C at t² = 3 tr C / tr G K Kᵀ Gᵀ.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray
+from pkmcal.display import displayed
+from pkmcal.fitted.fit import Fit
+from pkmcal.fitted.held_numbers import held_numbers
+from pkmcal.geometry.elastic import is_elastic
+from pkmcal.geometry.load import is_of_load
+from pkmcal.geometry.stated_uncertainty import StatedUncertainty
+from pkmcal.kinematics.calibratable import Calibratable
+from pkmcal.statistics.linear_fit import column_basis
+
+_KINDS = ("mm", "rad", "1")
+_REDUNDANT = 1e-6  # share of a number's motion that no free number has, below which it is one
+
+
+@dataclass(frozen=True)
+class Breakeven:
+    """Numbers of one unit that a fit held, and how wrong they may be.
+
+    Attributes
+    ----------
+    kinds : tuple of str
+        The numbers, as wildcards.
+    unit : str
+        "mm", "rad" or "1".
+    deviation : float
+        Of independent errors of all of them, with which the standard deviations of the result are
+        double on the whole.
+    """
+
+    kinds: tuple[str, ...]
+    unit: str
+    deviation: float
+
+    def __str__(self) -> str:
+        value, unit = displayed(self.deviation, self.unit)
+        verb = "are" if len(self.kinds) > 1 or self.kinds[0].endswith("*") else "is"
+        size = f"{value:.2g}" if unit == "1" else f"{value:.2g} {unit}"
+        return f"{', '.join(self.kinds)} {verb} wrong by {size}"
+
+
+def breakeven(fit: Fit) -> tuple[Breakeven, ...]:
+    """How wrong held numbers may be: lengths, angles and ratios, as far as there are such.
+
+    Nothing where equations are mixtures or the noise is not known.
+    """
+    sure, chosen = fit.uncertainty, fit.parameters
+    if not sure.known or sure.mixed or not len(chosen.places):
+        return ()
+    names = _candidates(fit, chosen.robot)
+    held = held_numbers(sure, fit.end, StatedUncertainty(dict.fromkeys(names, 1.0)))
+    if held is None:
+        return ()
+    follow = sure.fit.back @ (sure.fit.design.T @ held.columns)  # scaled, by each number
+    total = float(np.trace(sure.scaled))
+    found = []
+    for unit in _KINDS:
+        mine = [i for i, own in enumerate(held.units) if own == unit]
+        moved = float((follow[:, mine] ** 2).sum())
+        if moved > 0.0:
+            kinds = dict.fromkeys(re.sub(r"[0-9].*", "*", held.names[i]) for i in mine)
+            found.append(Breakeven(tuple(kinds), unit, float(np.sqrt(3.0 * total / moved))))
+    return tuple(found)
+
+
+def in_words(found: tuple[Breakeven, ...]) -> str:
+    """One sentence on all of them; "" without any."""
+    if not found:
+        return ""
+    return (
+        f"± double if {', or '.join(map(str, found))}: numbers that are not free count as exact;"
+        " state --uncertainty (uncertainty=) if they may be wrong by as much"
+    )
+
+
+def _candidates(fit: Fit, robot: Calibratable) -> list[str]:
+    """Numbers of the geometry that are held and are no other description of the free ones."""
+    geometry, chosen = robot.geometry, fit.parameters
+    free = {geometry.names[place] for place in chosen.places}
+    tied = {name for name in geometry.names if name not in geometry.match("*")}
+    others = [
+        name
+        for name, unit in zip(geometry.names, geometry.units, strict=True)
+        if name not in free | tied and unit in _KINDS
+        if not is_elastic(name) and not is_of_load(name)
+    ]
+    own = [geometry.names.index(name) for name in others]
+    twists = _twists(fit)
+    size = np.linalg.norm(twists, axis=0)
+    twists = twists / np.where(size > 0.0, size, 1.0)
+    basis = column_basis(twists[:, chosen.places])
+    columns = twists[:, own]
+    left = np.linalg.norm(columns - basis @ (basis.T @ columns), axis=0)
+    return [name for name, each in zip(others, left, strict=True) if each > _REDUNDANT]
+
+
+def _twists(fit: Fit) -> FloatArray:
+    """How the platform moves with all numbers (6 N, p) at the poses of the fit, mm."""
+    end, robot = fit.end, fit.end.robot
+    good = end.status == 0
+    twists = robot.error_twists(end.pose[good], end.actuators[good]).copy()
+    twists[:, :3] *= robot.length
+    flat: FloatArray = twists.reshape(-1, twists.shape[2])
+    return flat

@@ -1,0 +1,87 @@
+"""Which cause that is not in the model would explain what a fit leaves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pkmcal.diagnostics.cause_columns import possible, usable
+from pkmcal.diagnostics.check import Check, Level
+from pkmcal.display import chance_text
+from pkmcal.fitted.solution import Solution
+from pkmcal.statistics.causes import causes
+
+CHANCE = 0.05  # of naming any cause of a sound machine
+_SURE = 0.01  # below which one that moves the numbers makes a result doubtful
+_HARMFUL = 1.0  # standard deviations, rms over the parameters
+_MOST = 3  # that are named
+_FEW = 10.0  # degrees of freedom below which residuals tell no causes apart
+
+
+@dataclass(frozen=True)
+class FoundCause:
+    """A cause that is not in the model and would explain what the fit leaves.
+
+    Attributes
+    ----------
+    name : str
+        Which.
+    cure : str
+        What helps.
+    chance : float
+        How likely as much would be explained by chance, of all causes.
+    gain : float
+        Share by which the rms of the residuals would fall.
+    shift : float
+        How far it moved the parameters, in their standard deviations, rms.
+    also : tuple of str
+        Causes that would explain the same as well.
+    """
+
+    name: str
+    cure: str
+    chance: float
+    gain: float
+    shift: float
+    also: tuple[str, ...]
+
+
+def found_causes(found: Solution) -> tuple[FoundCause, ...]:
+    """Test all causes, the one that explains most first."""
+    sure = found.fit.uncertainty
+    if sure.mixed or sure.rounded or not usable(found.fit.end) or sure.fit.freedom < _FEW:
+        return ()
+    pairs = list(possible(found.fit))
+    every = causes(sure.fit, [columns for _, columns in pairs], CHANCE, _MOST)
+    return tuple(
+        FoundCause(
+            pairs[each.cause][0].name,
+            pairs[each.cause][0].cure,
+            each.chance,
+            each.gain,
+            each.shift,
+            tuple(pairs[k][0].name for k in each.also),
+        )
+        for each in every
+    )
+
+
+def _level(found: Solution, cause: FoundCause) -> Level:
+    return "doubt" if cause.chance < _SURE and cause.shift > _HARMFUL else "remark"
+
+
+def _text(found: Solution, cause: FoundCause) -> str:
+    also = f" (or as well {', '.join(cause.also)})" if cause.also else ""
+    harm = f", and the numbers move by {cause.shift:.2g} of their ±" if cause.shift > 0.5 else ""
+    return (
+        f"residuals look like {cause.name}{also}: with it they fall by {100 * cause.gain:.0f} %"
+        f" ({chance_text(cause.chance)}){harm}; {cause.cure}"
+    )
+
+
+CHECKS = (
+    Check(
+        name="causes", about="a cause that is not in the model would explain residuals",
+        levels=("doubt", "remark"), level_of=_level, run=found_causes, say=_text,
+        unless=("grave",),
+    ),
+)  # fmt: skip

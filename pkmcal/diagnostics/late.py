@@ -1,0 +1,106 @@
+"""Whether readings were taken before the machine had arrived, or after it left, or logs differ.
+
+Such a reading is off where the machine stops by a share of the way from the pose before, or to the
+next. One number says how much; a score test of it, through the machine's own derivatives, sees what
+is far below a row: trials of whole rows that are late do not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray
+from pkmcal.diagnostics.visits import visits_of
+from pkmcal.display import chance_text
+from pkmcal.fitted.solution import Solution
+from pkmcal.statistics.score_test import score_test
+
+CHANCE = 1e-3  # below which readings are late
+
+
+@dataclass(frozen=True)
+class Late:
+    """By how much readings are late, or after the machine left.
+
+    Attributes
+    ----------
+    share : float
+        Of the way from the pose before, or to the next; negative where the actuators were read
+        there and not the instrument.
+    stderr : float
+        Its standard deviation.
+    chance : float
+        How likely a share as large, of either way, would be if they were not.
+    leaving : bool
+        Whether it is of the way to the next pose.
+    """
+
+    share: float
+    stderr: float
+    chance: float
+    leaving: bool
+
+    @property
+    def found(self) -> bool:
+        """Whether one of them is of another moment."""
+        return self.chance < CHANCE
+
+    def __str__(self) -> str:
+        odds = chance_text(self.chance)
+        if self.leaving:
+            way = f"{100 * abs(self.share):.2g} % of the way to the next pose"
+            return (
+                f"{'readings' if self.share > 0.0 else 'actuators'} are as if"
+                f" {'taken' if self.share > 0.0 else 'logged'} after the machine had gone {way}"
+                f" ({odds}): log both at one moment, when the machine stands; or the rows stand in"
+                " the reversed order of measuring, and readings are late"
+            )
+        short = f"{100 * abs(self.share):.2g} % of the way from the pose before"
+        if self.share > 0.0:
+            return (
+                f"readings are as if taken {short} before the machine arrived ({odds}): let it"
+                " settle for longer before each reading, and see that actuators and instrument are"
+                " logged at one moment"
+            )
+        return (
+            f"actuators are as if logged {short} before the machine arrived where the instrument"
+            f" read it ({odds}): log both at one moment, when the machine stands"
+        )
+
+
+def late(found: Solution) -> Late | None:
+    """Test it; None where rows are mixtures, or residuals rounding errors."""
+    sure = found.fit.uncertainty
+    if sure.mixed or sure.rounded or not sure.equations.whitening.any_read:
+        return None
+    visits = visits_of(found)
+    tested = {
+        leaving: score_test(sure.fit, _columns(found, place))
+        for leaving, place in ((False, visits.before), (True, visits.after))
+    }
+    known = {leaving: score for leaving, score in tested.items() if score is not None}
+    if not known:
+        return None
+    leaving = min(known, key=lambda each: (known[each].chance, -known[each].drop))
+    score = known[leaving]
+    chance = min(1.0, len(known) * score.chance)
+    return Late(float(score.size[0]), float(score.deviation[0]), chance, leaving)
+
+
+def _columns(found: Solution, place: FloatArray) -> FloatArray:
+    """How equations (M, 1) change with the share of the way to places (N, n) that readings are off.
+
+    The places are actuator readings.
+    """
+    fit = found.fit
+    sure, equations, end = fit.uncertainty, fit.equations, fit.end
+    way = place - np.concatenate([m.actuators for m in equations.table.sets])
+    twists = end.machines.actuator_twists(end.states)[np.concatenate(equations.table.pose_of)]
+    back = np.split(
+        (twists @ way[:, :, None])[:, :, 0], np.cumsum([len(m) for m in equations.table.sets])[:-1]
+    )
+    seen = equations.prediction.predicted(end)
+    parts = [each.by_twist @ own[:, :, None] for each, own in zip(seen, back, strict=True)]
+    return sure.equations.whitening.whitened(parts, sure.factors)

@@ -1,0 +1,126 @@
+"""Other readings of measurements: units, signs, columns, orders of angles that may be meant."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from pkmcal.measurements.inverted import inverted
+from pkmcal.measurements.measurements import Measurements
+from pkmcal.measurements.table_layout import ORDERS, OWN_ORDER
+from pkmcal.readings.reading import Family
+
+_OWN = ("XYZ", "XZY", "YXZ", "YZX", "ZXY")  # other orders of an angle about x, y and z each
+_REVERSED = "counts the other way"
+_FACTORS = {
+    "mm": (("metres", 1e3), ("centimetres", 10.0), ("inches", 25.4), ("micrometres", 1e-3)),
+    "rad": (
+        ("degrees", np.pi / 180),
+        ("milliradians", 1e-3),
+        ("radians that were taken for degrees", 180 / np.pi),
+    ),
+}
+
+
+def other_readings(
+    measured: Measurements, actuator_units: Sequence[str]
+) -> Iterator[tuple[str, Measurements]]:
+    """Read measurements in other units, with other signs and with columns exchanged."""
+    for unit in dict.fromkeys(actuator_units):
+        mine = np.array([unit == other for other in actuator_units])
+        for name, factor in _FACTORS.get(unit, ()):
+            q = np.where(mine, measured.actuators * factor, measured.actuators)
+            yield f"the actuators are in {name}", replace(measured, actuators=q)
+    yield "the actuators count the other way", replace(measured, actuators=-measured.actuators)
+    yield from exchanges(measured)
+    for unit in dict.fromkeys(measured.units):
+        mine = np.array([unit == other for other in measured.units])
+        what = Family(unit).noun.replace("lengths", "measured lengths")
+        for name, factor in _FACTORS.get(unit, ()):
+            values = measured.values * (factor if mine.all() else np.where(mine, factor, 1.0))
+            yield f"the {what} are in {name}", replace(measured, values=values)
+    names = measured.components
+    for one, other in itertools.combinations(range(len(names)), 2):
+        if measured.units[one] != measured.units[other]:
+            continue
+        values = measured.values.copy()
+        values[:, [one, other]] = values[:, [other, one]]
+        yield f"{names[one]} and {names[other]} are exchanged", replace(measured, values=values)
+    yield from _other_turns(measured)
+    yield from _single_columns(measured, actuator_units)
+
+
+def _single_columns(
+    measured: Measurements, actuator_units: Sequence[str]
+) -> Iterator[tuple[str, Measurements]]:
+    """Read one column in another unit, or with the other sign."""
+    for i, unit in enumerate(actuator_units):
+        for words, factor in (*_FACTORS.get(unit, ()), (_REVERSED, -1.0)):
+            q = measured.actuators.copy()
+            q[:, i] *= factor
+            yield _of_column(f"q{i + 1}", words), replace(measured, actuators=q)
+    rows = measured.values.reshape(len(measured), -1)
+    for k, (name, unit) in enumerate(zip(measured.components, measured.units, strict=True)):
+        for words, factor in (*_FACTORS.get(unit, ()), (_REVERSED, -1.0)):
+            values = rows.copy()
+            values[:, k] *= factor
+            values = values.reshape(measured.values.shape)
+            yield _of_column(name, words), replace(measured, values=values)
+
+
+def _of_column(name: str, words: str) -> str:
+    return f"{name} {words}" if words == _REVERSED else f"{name} is in {words}"
+
+
+def _other_turns(measured: Measurements) -> Iterator[tuple[str, Measurements]]:
+    """Read orientations in other orders, from the other side, quaternions from the other end."""
+    from scipy.spatial.transform import Rotation
+
+    first = measured.instrument.turning
+    if first is None or measured.values is None:
+        return
+    turned = measured.values[:, first : first + 3]
+    good = np.isfinite(turned).all(axis=1)
+
+    def of(turns: Any) -> Measurements:
+        values = measured.values.copy()
+        values[good, first : first + 3] = turns.as_euler(OWN_ORDER)
+        return replace(measured, values=values)
+
+    given = Rotation.from_euler(OWN_ORDER, turned[good])
+    q = given.as_quat()  # x y z w
+    for words, other in (
+        ("the scalar of the quaternions is their last number", q[:, [3, 0, 1, 2]]),
+        ("the scalar of the quaternions is their first number", q[:, [1, 2, 3, 0]]),
+    ):
+        yield words, of(Rotation.from_quat(other))
+    for order in _OWN:
+        angles = turned[good][:, ["XYZ".index(axis) for axis in order]]
+        words = f"the angles are about turned axes in the order {order} (--rotation {order})"
+        yield words, of(Rotation.from_euler(order, angles))
+    for order in sorted({*ORDERS} - {OWN_ORDER, "XYZ"}):
+        words = (
+            f"the angles are, one after the other, those of {order} (columns A, B, C with"
+            f" --rotation {order})"
+        )
+        yield words, of(Rotation.from_euler(order, turned[good]))
+    words = "are those of the base in the platform's frame"
+    yield f"orientations {words}", of(given.inv())
+    if first:
+        yield f"poses {words} (--invert-poses)", inverted(measured)
+
+
+def exchanges(measured: Measurements) -> Iterator[tuple[str, Measurements]]:
+    """Read measurements with two actuators exchanged."""
+    columns = np.arange(measured.actuators.shape[1])
+    for a, b in itertools.combinations(columns, 2):
+        order = columns.copy()
+        order[[a, b]] = b, a
+        swapped = replace(measured, actuators=measured.actuators[:, order])
+        one, other = f"q{a + 1}", f"q{b + 1}"
+        typed = f" (--rename {one}={other} --rename {other}={one}, if the file calls them so)"
+        yield f"{one} and {other} are exchanged{typed if measured.file else ''}", swapped

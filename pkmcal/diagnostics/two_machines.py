@@ -1,0 +1,141 @@
+"""Whether some of the rows are of another machine: sets, sessions, halves, rows in turn."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from pkmcal.arrays import BoolArray, FloatArray
+from pkmcal.diagnostics.visits import Visits, visits_of
+from pkmcal.display import chance_text, printable
+from pkmcal.fitted.solution import Solution
+from pkmcal.statistics.group_test import few_equations, group_test
+from pkmcal.statistics.linear_fit import column_basis, numbered
+
+CHANCE = 1e-3  # below which a group of rows is of another machine
+_LARGE = 0.8  # times the residuals, above which errors of a model may be as large
+_APART = 0.3  # of the variance of belonging to the group that the actuators explain
+
+
+@dataclass(frozen=True)
+class Apart:
+    """The group of rows that numbers of the other rows fit worst.
+
+    Attributes
+    ----------
+    group : str
+        Which rows, in words.
+    chance : float
+        How likely a difference as large would be if all rows were of one machine, times the number
+        of groups that were tested.
+    residual : float
+        Standard deviation of the residuals with numbers of its own, over that with common ones.
+    elsewhere : bool
+        Whether it was measured at other places than the other rows, or of other things: then a
+        model that is slightly wrong shows alike.
+    """
+
+    group: str
+    chance: float
+    residual: float
+    elsewhere: bool
+
+    @property
+    def large(self) -> bool:
+        """Whether it is more than a model that is slightly wrong shows."""
+        return self.residual < _LARGE and not self.elsewhere
+
+    @property
+    def found(self) -> bool:
+        """Whether it is of another machine."""
+        return self.chance < CHANCE
+
+    def __str__(self) -> str:
+        if self.elsewhere:
+            return (
+                f"{self.group}, measured at other places than the other rows, and these fit better"
+                f" with numbers of their own, {self.residual:.2g} times the residuals"
+                f" ({chance_text(self.chance)}): the model misses something there, or the machine"
+                " was changed meanwhile; poses in another order would tell"
+            )
+        return (
+            f"{self.group} and the other rows are as if of two machines: with numbers of its own"
+            f" each has {self.residual:.2g} times the residuals ({chance_text(self.chance)}). Were"
+            " files joined, or was the machine changed meanwhile? Calibrate each by itself, or find"
+            " what changed by session"
+        )
+
+
+def apart(found: Solution) -> Apart | None:
+    """Test all groups; None where rows are mixtures, residuals rounding errors, or too few."""
+    sure = found.fit.uncertainty
+    if sure.mixed or sure.rounded or not sure.equations.whitening.any_read:
+        return None
+    visits = visits_of(found)
+    row = sure.labels.row
+    use = np.flatnonzero(~np.isin(sure.equations.table.rows, found.outliers)[row])
+    key = numbered(visits.series[row][use], visits.visit[row][use], sure.labels.component[use])
+    groups = dict(_groups(found, visits))
+    cell = np.zeros(len(row), dtype=np.intp)
+    for mine in groups.values():
+        cell = numbered(cell, mine[row].astype(np.intp))
+    few = few_equations(sure.fit.design, sure.fit.residual, use, key, cell)
+    first = np.unique(cell, return_index=True)[1]  # an equation of each cell
+    tested = {
+        name: group_test(few.design, few.residual, mine[row][first][few.cell], few.count)
+        for name, mine in groups.items()
+    }
+    known = {name: each for name, each in tested.items() if each is not None}
+    if not known:
+        return None
+    name = min(known, key=lambda each: known[each].chance)
+    best = known[name]
+    chance = min(1.0, len(known) * best.chance)
+    return Apart(name, chance, best.apart, _elsewhere(found, groups[name]))
+
+
+def _elsewhere(found: Solution, mine: BoolArray) -> bool:
+    """Whether rows (N,) were measured at other places or loads than the rest, or of other things.
+
+    Places and loads that differ explain much of who belongs to the group, linearly.
+    """
+    table = found.fit.equations.table
+    columns = [np.concatenate([m.actuators for m in table.sets])]
+    if len(table.sets) == 1:
+        subject = table.sets[0].instrument.subject(len(mine))
+        columns.append(subject[:, None] == np.unique(subject))
+    if all(m.load is not None for m in table.sets):
+        columns.append(np.concatenate([m.drive_state.load for m in table.sets]))
+    return max(_explained(each, mine) for each in columns) > _APART
+
+
+def _explained(columns: FloatArray, mine: BoolArray) -> float:
+    """Share of the variance of belonging to a group (N,) that columns (N, k) explain, adjusted."""
+    belongs = mine - mine.mean()
+    columns = columns[:, (columns != columns[0]).any(axis=0)]
+    if not columns.size or not belongs.any():
+        return 0.0
+    basis = column_basis(columns - columns.mean(axis=0))
+    freedom = max(1, len(mine) - basis.shape[1] - 1)
+    share = float(((basis.T @ belongs) ** 2).sum() / (belongs**2).sum())
+    return float(1.0 - (1.0 - share) * (len(mine) - 1) / freedom)
+
+
+def _groups(found: Solution, visits: Visits) -> Iterator[tuple[str, BoolArray]]:
+    """Groups of rows (N,) that may be of another machine, and what they are called."""
+    equations = found.fit.equations
+    yield "every second pose", visits.visit % 2 == 1
+    yield "the second half of the rows", 2 * visits.visit >= visits.visits
+    several = len(equations.table.sets) > 1
+    for i, m in enumerate(equations.table.sets):
+        mine = equations.table.set_of == i
+        if several and m.components:
+            yield printable(m.file or f"measurements {i + 1}"), mine
+        if m.session is None or found.sessions:
+            continue
+        for name in m.sessions if len(m.sessions) > 1 else ():
+            of_session = mine.copy()
+            of_session[mine] = m.session == name
+            yield f"session {printable(name)}", of_session

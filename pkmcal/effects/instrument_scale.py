@@ -1,0 +1,80 @@
+"""The scale of an instrument: all lengths that it reads are 1 + s times what they are.
+
+A tracker reads too long or too short by parts per million, by the air's temperature or its own
+calibration. What it reads of a point is then moved by s times the place of that point; of a
+distance by s times the distance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.core import screws
+from pkmcal.effects.effect import Moved
+from pkmcal.geometry.stated_uncertainty import SCALE
+from pkmcal.measurements.measurements import Measurements
+from pkmcal.readings.unknowns import Dependence, Numbers
+
+_TYPICAL = 1e-3  # of a length: what moves a reading as much as 1 mm does at a distance of 1 m
+
+
+@dataclass(frozen=True)
+class InstrumentScale:
+    """By how much an instrument reads lengths too long, found with the geometry as ``scale``."""
+
+    name: ClassVar[str] = SCALE
+
+    def dependences(self, measured: Measurements) -> Iterator[Dependence]:
+        """One number, common to all rows."""
+        count = len(measured)
+        number = Numbers(
+            (SCALE,), ("1",), np.zeros(1, dtype=np.intp), np.zeros(1), np.array([_TYPICAL])
+        )
+        given, every = np.zeros((count, 1)), np.zeros(count, dtype=np.intp)
+        yield Dependence(SCALE, SCALE, given, {"": number}, every)
+
+    def of_rows(self, measured: Measurements) -> ScaledRows:
+        """The effect in rows of one kind: distances count from their anchors."""
+        reads = "mm" in measured.units and measured.touched is None
+        return ScaledRows(reads, measured.instrument.point == "base")
+
+
+@dataclass(frozen=True)
+class ScaledRows:
+    """How readings of one set follow the scale.
+
+    Attributes
+    ----------
+    reads : bool
+        Whether they are lengths that an instrument reads.
+    anchored : bool
+        Whether they are distances from a fixed point.
+    """
+
+    reads: bool
+    anchored: bool
+
+    def moved(
+        self,
+        machine: Any,
+        pose: FloatArray,
+        actuators: FloatArray,
+        rows: IntArray,
+        numbers: Mapping[str, FloatArray],
+    ) -> Moved:
+        """How the platform would have to move at poses (N, 6) for the same readings."""
+        scale = numbers[SCALE][rows, 0]
+        place = pose[:, :3]
+        if self.anchored:
+            turned = screws.frames(pose)[:, :3, :3] @ numbers["target"][rows][:, :, None]
+            place = place + turned[:, :, 0] - numbers["anchor"][rows]
+        by = np.concatenate([np.zeros_like(place), place * self.reads], axis=1)
+        moved = Moved(by * scale[:, None], {SCALE: by[:, :, None]})
+        if self.anchored or not self.reads:
+            return moved
+        return moved._replace(growth=scale, growth_by={SCALE: np.ones((len(rows), 1))})

@@ -1,0 +1,192 @@
+"""Sag of an arm: its joints yield under the weight of its links, whose masses need not be known.
+
+The torque of gravity about a joint is linear in the moments of the links behind it, and so is what
+it turns the joint. Products of moment and compliance are found as numbers of the arm, in rad: they
+are turns of a joint by a unit moment of a link. Where masses are known one compliance a joint says
+as much (`Sag(tied=True)`), and what another payload does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from pkmcal.arguments import instance, number
+from pkmcal.arms import urdf
+from pkmcal.arms.arm import SerialArm
+from pkmcal.arms.joint_laws import JointLaws, Term, sag_term
+from pkmcal.arms.weights import gravity_products, gravity_torques
+from pkmcal.arrays import FloatArray
+from pkmcal.effects.effect import Changed
+from pkmcal.exceptions import ArgumentError
+from pkmcal.kinematics.calibratable import ArmMachine, Calibratable
+
+Joints = Literal["main", "all"] | int | Sequence[int]
+TURNS = 1e-3  # rad: by so much, more or less, the moments of its links turn a joint of an arm
+_POSTURES = 200
+_NOTHING = 1e-6  # share of a torque that is none
+_MAIN = 2
+
+
+@dataclass(frozen=True, repr=False)
+class Sag:
+    """Sag of an arm's joints under its own weight, an effect that `identify` finds.
+
+    Parameters
+    ----------
+    joints : "main", "all", int or sequence of int
+        Those that yield, counted from 1, by the moments of their links. "main": the two that the
+        weight of the arm turns most. "all": every joint that gravity can turn.
+    tied : bool
+        Whether masses and centres of the links are known, from the arm's file or its URDF: then one
+        compliance a joint is found.
+    turns : float
+        Standard deviation of what moments turn a joint, rad: the prior of its numbers.
+
+    Examples
+    --------
+    >>> Sag("all")
+    Sag('all')
+    """
+
+    joints: Joints = "main"
+    tied: bool = False
+    turns: float = TURNS
+    name: ClassVar[str] = "sag"
+
+    def __repr__(self) -> str:
+        stated = [] if self.joints == "main" else [repr(self.joints)]
+        stated += ["tied=True"] * self.tied
+        stated += [] if self.turns == TURNS else [f"turns={self.turns!r}"]
+        return f"Sag({', '.join(stated)})"
+
+    @property
+    def option(self) -> str:
+        """As ``--effects`` has it."""
+        if self.tied:
+            return "sag=tied"
+        if self.joints == "main":
+            return "sag"
+        joints = [self.joints] if isinstance(self.joints, str | int) else self.joints
+        return f"sag={':'.join(map(str, joints))}"
+
+    def of_machine(self, machine: Calibratable) -> Changed:
+        """The arm with the numbers of its sag.
+
+        Raises
+        ------
+        ValueError, TypeError
+            No arm, a joint that it has not or that gravity cannot turn, masses that are not known.
+        """
+        if not isinstance(machine, ArmMachine):
+            raise ArgumentError(
+                f"sag: {machine.name} is no serial arm; of other machines compliances are numbers"
+            )
+        turns = number("turns", self.turns, above=0.0)
+        arm = machine.arm
+        joints = self._chosen(arm)
+        if self.tied:
+            return _tied(arm, joints, turns)
+        terms = _independent(arm, joints)
+        own = dict.fromkeys((term.name for term in terms), turns)
+        return Changed(self.name, ArmMachine(arm.with_terms(terms)), own)
+
+    def _chosen(self, arm: SerialArm) -> list[int]:
+        """The joints that yield, counted from 0."""
+        largest = np.abs(_products(arm)).max(axis=(0, 2, 3))
+        turned: list[int] = np.flatnonzero(largest > _NOTHING).tolist()
+        if not turned:
+            raise ArgumentError(f"sag: gravity turns no joint of {arm.name}")
+        if self.joints == "all":
+            return turned
+        if self.joints == "main":
+            lever = _levers(arm)
+            return sorted(sorted(turned, key=lambda i: -lever[i])[:_MAIN])
+        if isinstance(self.joints, str):
+            raise ArgumentError(f'sag: joints are "main", "all" or numbers; found {self.joints!r}')
+        given = [self.joints] if isinstance(self.joints, int) else list(self.joints)
+        for each in given:
+            instance("joints", each, int)
+            if each - 1 not in turned:
+                known = ", ".join(str(i + 1) for i in turned)
+                raise ArgumentError(f"sag: gravity turns joints {known}; found {each}")
+        return sorted({each - 1 for each in given})
+
+
+def _postures(arm: SerialArm) -> FloatArray:
+    """Joint coordinates all over, which do not depend on what was measured."""
+    turning = np.array([unit == "rad" for unit in arm.actuator_units])
+    spread = np.where(turning, np.pi, arm.length)
+    return np.random.default_rng(0).uniform(-1.0, 1.0, (_POSTURES, arm.n_joints)) * spread
+
+
+def _bare(arm: SerialArm) -> SerialArm:
+    """The arm whose products of gravity its laws take."""
+    return arm.rigid.replace(np.zeros((arm.n_joints, 6)))
+
+
+def _gravity(arm: SerialArm) -> FloatArray:
+    laws = arm.laws or JointLaws(arm.axes, arm.points, arm.kinds, {})
+    return np.array(laws.gravity)
+
+
+def _products(arm: SerialArm) -> FloatArray:
+    return gravity_products(_bare(arm), _postures(arm), _gravity(arm))
+
+
+def _levers(arm: SerialArm) -> FloatArray:
+    """Rms torque about each joint (n,) if all links weighed alike, half way to the next joint."""
+    ends = np.vstack([arm.points[1:], arm.home[None, :3, 3]])
+    torques = gravity_torques(
+        _bare(arm), _postures(arm), np.ones(arm.n_joints), (arm.points + ends) / 2, _gravity(arm)
+    )
+    rms: FloatArray = np.sqrt(np.mean(torques**2, axis=0))
+    return rms
+
+
+def _independent(arm: SerialArm, joints: Sequence[int]) -> list[Term]:
+    """Products of which each turns its joint otherwise than those before it.
+
+    A moment along the axis of the next joint turns with that joint's link as well.
+    """
+    products = _products(arm)
+    found: list[Term] = []
+    for joint in joints:
+        basis = np.zeros((_POSTURES, 0))
+        for link in (each for each in joints if each >= joint):
+            for axis in range(3):
+                column = products[:, joint, link, axis]
+                left = column - basis @ (basis.T @ column)
+                size = float(np.linalg.norm(left))
+                if size > _NOTHING * np.sqrt(_POSTURES):
+                    basis = np.column_stack([basis, left / size])
+                    found.append(sag_term(joint, link, axis))
+    return found
+
+
+def _tied(arm: SerialArm, joints: Sequence[int], turns: float) -> Changed:
+    """The arm with a compliance of each of these joints."""
+    laws = arm.laws or JointLaws(arm.axes, arm.points, arm.kinds, {})
+    if laws.masses is None or laws.centres is None:
+        if arm.source is None:
+            raise ArgumentError(
+                "sag: tied needs masses: keys mass and centre of the joints in the arm's file, or"
+                " inertials in its URDF"
+            )
+        masses, centres = urdf.weights(*arm.source)
+        laws = replace(laws, masses=masses, centres=centres)
+    assert laws.masses is not None and laws.centres is not None
+    torques = gravity_torques(
+        _bare(arm), _postures(arm), laws.masses, laws.centres, np.array(laws.gravity)
+    )
+    size = np.sqrt(np.mean(torques**2, axis=0))
+    own = {}
+    for i in joints:
+        if not size[i] > 0.0:
+            raise ArgumentError(f"sag: the links behind joint {i + 1} weigh nothing")
+        own[Term(i, "compliance")] = turns / float(size[i])
+    changed = arm.with_laws(laws.with_terms(own))
+    return Changed("sag", ArmMachine(changed), {term.name: each for term, each in own.items()})

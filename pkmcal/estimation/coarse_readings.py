@@ -1,0 +1,90 @@
+"""Components of what was read whose residuals are no larger than the steps of the readings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.estimation.equations import Equations
+from pkmcal.estimation.labels import Labels
+from pkmcal.statistics.covariance import Covariance
+from pkmcal.statistics.linear_fit import LinearFit
+from pkmcal.statistics.steps import deviation, step_of
+
+DITHERED = 1.5  # times a step's deviation, from which residuals are noise that spreads the steps
+
+
+@dataclass(frozen=True)
+class Coarse:
+    """A component that was read in steps, and what the fit shows of its noise.
+
+    Attributes
+    ----------
+    set, component : int
+        Which.
+    step : float
+        Of which all readings are multiples, mm or rad.
+    residual, freedom : float
+        Standard deviation of its residuals, and degrees of freedom of that.
+    used : float
+        Standard deviation that the covariance takes for it.
+    """
+
+    set: int
+    component: int
+    step: float
+    residual: float
+    freedom: float
+    used: float
+
+    @property
+    def floor(self) -> float:
+        """Standard deviation that rounding alone gives a reading."""
+        return deviation(self.step)
+
+    @property
+    def widening(self) -> float:
+        """By how much ± must be wider, so that they allow for rounding."""
+        return max(self.floor / self.used, 1.0) if self.used > 0 else 1.0
+
+
+def coarse_readings(
+    equations: Equations, named: Labels, fit: LinearFit, factors: FloatArray, covariance: Covariance
+) -> tuple[Coarse, ...]:
+    """Find them, for noise factors (G,); none of mixtures of readings and closures."""
+    if equations.machines.unknowns:
+        return ()
+    variances = equations.whitening.variances(factors)
+    component = component_of(equations)
+    found = []
+    for i, measured in enumerate(equations.table.sets):
+        values = measured.values.reshape(len(measured), -1)
+        for k, unit in enumerate(measured.units):
+            mine = (named.set_of == i) & (component == k)
+            if not mine.any():
+                continue
+            weighted = float(variances[mine].mean())
+            freedom = float((1.0 - fit.leverage[mine]).sum())
+            squares = float((fit.residual[mine] ** 2 * variances[mine]).sum())
+            residual = float(np.sqrt(squares / freedom)) if freedom > 0 else float("nan")
+            used = covariance.scale * weighted**0.5
+            used = residual if covariance.rule == "cluster" else used
+            step = step_of(values[:, k], unit, least=_least(residual, used))
+            if step:
+                found.append(Coarse(i, k, step, residual, freedom, used))
+    return tuple(found)
+
+
+def component_of(equations: Equations) -> IntArray:
+    """Number of the component of each equation (M,) in its set."""
+    every = [np.tile(np.arange(len(m.components)), len(m)) for m in equations.table.sets]
+    component: IntArray = np.concatenate(every)[equations.whitening.present]
+    return component
+
+
+def _least(*deviations: float) -> float:
+    """The smallest step that matters beside the smaller of these deviations."""
+    known = [each for each in deviations if np.isfinite(each)]
+    return min(known, default=0.0) / (DITHERED * deviation(1.0))

@@ -1,0 +1,130 @@
+"""Numbers that are not looked for and are not exact: they are fitted along, near where they are.
+
+Their stated deviations are a prior about their present values. Numbers with a `common` deviation
+are wrong by the same amount: their errors have a covariance, and it is its inverse root that the
+equations of this prior have.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray
+from pkmcal.effects.instrument_scale import InstrumentScale
+from pkmcal.estimation.fit_data import PLACE, FitData
+from pkmcal.estimation.sessions import matches
+from pkmcal.estimation.starts import with_starts
+from pkmcal.geometry.stated_uncertainty import SCALE, StatedUncertainty, of_geometry
+from pkmcal.kinematics.calibratable import Calibratable
+
+_ALIKE = 1e-4  # of a common deviation, by which numbers without one of their own may differ
+_FLAGS = {  # of a set, where what such names begin with is estimated
+    "unknown_frame": ("frame",),
+    "unknown_target": ("target", "anchor", "tool", "mounting"),
+    "unknown_attachment": ("attachment",),
+}
+
+
+def uncertain_names(
+    stated: StatedUncertainty, robot: Calibratable, others: Iterable[str]
+) -> list[str]:
+    """Numbers of the geometry that are uncertain and are none of `others`, in its order.
+
+    Raises
+    ------
+    ValueError
+        A name that the geometry has not, or that another number drives.
+    """
+    geometry, found = robot.geometry, set[str]()
+    for pattern in stated.patterns:
+        if of_geometry(pattern, geometry.names):
+            found.update(geometry.match(pattern, "uncertainty"))
+    names = [name for name in geometry.names if name in found - set(others)]
+    sigma = np.sqrt(np.diagonal(spread(stated, names)))
+    return [name for name, own in zip(names, sigma, strict=True) if own > 0.0]
+
+
+def spread(stated: StatedUncertainty, names: Sequence[str]) -> FloatArray:
+    """Covariance (u, u) of the errors of numbers by their names, mm, rad and 1."""
+    own = np.array([_last(stated.own, name)[1] for name in names]).reshape(len(names))
+    shared = np.zeros((len(names), len(names)))
+    groups: dict[tuple[str, str], list[int]] = {}
+    common = np.zeros(len(names))
+    for i, name in enumerate(names):
+        pattern, common[i] = _last(stated.common, name)
+        if _last(stated.consider, name)[1] > 0.0:  # allowed for otherwise
+            own[i] = common[i] = 0.0
+        groups.setdefault((pattern, _alike(name)), []).append(i)
+    for (pattern, _), mine in groups.items():
+        if pattern:
+            shared[np.ix_(mine, mine)] = np.outer(common[mine], common[mine])
+    own = np.where((own == 0.0) & (common > 0.0), _ALIKE * common, own)
+    found: FloatArray = np.diag(own**2) + shared
+    return found
+
+
+def inverse_root(covariance: FloatArray) -> FloatArray:
+    """The symmetric root (u, u) of the inverse of a covariance, whatever units its numbers have."""
+    sigma = np.sqrt(np.diagonal(covariance))
+    value, axes = np.linalg.eigh(covariance / np.outer(sigma, sigma))
+    found: FloatArray = (axes / np.sqrt(value)) @ axes.T / sigma
+    return found
+
+
+def uncertain_sets(
+    robot: Calibratable, datasets: Sequence[FitData], stated: StatedUncertainty
+) -> tuple[list[FitData], frozenset[str]]:
+    """Sets whose frame and points are fitted along where they are uncertain, and these roles.
+
+    What `identify` was asked to find in some set is none of them.
+    """
+    names, sets = robot.geometry.names, list(datasets)
+    either = {**stated.own, **stated.common}
+    beside = [each for each in either if either[each] > 0.0 and not of_geometry(each, names)]
+    roles = set[str]()
+    for flag, begins in _FLAGS.items():
+        meant = any(pattern.startswith(begins) for pattern in beside)
+        if not meant or any(getattr(data, flag) for data in datasets):
+            continue
+        for i, data in enumerate(sets):
+            (other,) = with_starts(robot, [replace(data, **{flag: True})])  # type: ignore[arg-type]
+            known, found = _estimated(data), _estimated(other).items()
+            new = {role: own for role, own in found if own != known.get(role)}
+            if any(_last(either, name)[1] > 0.0 for own in new.values() for name in own):
+                sets[i] = other
+                roles |= {*new}
+    if SCALE in beside and not any(each.name == SCALE for each in sets[0].effects):
+        sets = [replace(data, effects=(*data.effects, InstrumentScale())) for data in sets]
+        roles.add(SCALE)
+    return sets, frozenset(roles)
+
+
+def _estimated(data: FitData) -> dict[str, list[str]]:
+    """Names of what is estimated beside the geometry, by role."""
+    found: dict[str, list[str]] = {}
+    if data.framed:
+        found["frame"] = [f"frame.{axis}" for axis, _ in PLACE]
+    for each in data.dependences():
+        for own in each.estimated.values():
+            found.setdefault(each.role, []).extend(own.names)
+    return found
+
+
+def _last(entries: Mapping[str, float], name: str) -> tuple[str, float]:
+    """The last entry that means a number: its pattern and deviation; "" and 0 without."""
+    for pattern in reversed([*entries]):
+        if matches(pattern, name):
+            return pattern, entries[pattern]
+    return "", 0.0
+
+
+def _alike(name: str) -> str:
+    """What numbers have in common that are wrong by the same: kind, coordinate and session."""
+    stem, _, behind = name.partition("@")
+    point, dot, axis = stem.partition(".")
+    kind = re.sub(r"(?<=target|anchor).+|(?<=attachment).+|\d+$", "", point)
+    return f"{kind}{dot}{axis}@{behind}"

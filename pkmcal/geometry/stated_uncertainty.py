@@ -1,0 +1,167 @@
+"""What is stated of numbers that a calibration does not look for: how wrong they may be.
+
+``[uncertainty]`` of a robot file, and the argument `uncertainty` of `identify`: a standard
+deviation by name or wildcard. Under ``common`` all numbers that it matches are wrong by one and
+the same amount; under ``consider`` they are not fitted along.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
+from typing import Any
+
+from pkmcal.arguments import number, shown
+from pkmcal.arrays import Unit
+from pkmcal.exceptions import ArgumentError, ArgumentTypeError
+from pkmcal.files.toml_table import Table
+from pkmcal.geometry.geometry import Geometry
+
+COMMON, CONSIDER, SCALE = "common", "consider", "scale"
+Uncertain = Mapping[str, float | Mapping[str, float]] | None
+_BESIDE = re.compile(r"(frame|target|anchor|attachment|tool|mounting)[^@]*(@.*)?|scale")
+_ANGLES = (".alpha", ".beta", ".gamma")
+
+
+@dataclass(frozen=True)
+class StatedUncertainty:
+    """Standard deviations by name or wildcard, mm, rad and 1; later entries before earlier ones.
+
+    Attributes
+    ----------
+    own : mapping of str to float
+        Of each number by itself; 0 where it is exact.
+    common : mapping of str to float
+        Of one amount that all numbers have in common, of a point each coordinate.
+    consider : mapping of str to float
+        Of numbers that are not fitted along: deviations alone allow for them.
+    """
+
+    own: Mapping[str, float] = field(default_factory=dict)
+    common: Mapping[str, float] = field(default_factory=dict)
+    consider: Mapping[str, float] = field(default_factory=dict)
+
+    def __bool__(self) -> bool:
+        return bool(self.own or self.common or self.consider)
+
+    @property
+    def patterns(self) -> tuple[str, ...]:
+        """Every name or wildcard, once."""
+        return tuple(dict.fromkeys([*self.own, *self.common, *self.consider]))
+
+    def with_later(self, other: StatedUncertainty) -> StatedUncertainty:
+        """These entries, and behind them those of another statement."""
+        return StatedUncertainty(
+            _behind(self.own, other.own),
+            _behind(self.common, other.common),
+            _behind(self.consider, other.consider),
+        )
+
+    def table(self) -> dict[str, Any]:
+        """As it stands in a robot file, and as `identify` takes it."""
+        beside = {COMMON: dict(self.common), CONSIDER: dict(self.consider)}
+        return dict(self.own) | {key: own for key, own in beside.items() if own}
+
+
+NOTHING = StatedUncertainty()
+
+
+def stated_uncertainty(given: Uncertain, argument: str = "uncertainty") -> StatedUncertainty:
+    """The argument `uncertainty` of `identify`, checked.
+
+    Raises
+    ------
+    ValueError, TypeError
+        No mapping, a name that is no text, a deviation that is no number or negative.
+    """
+    if given is None:
+        return NOTHING
+    parts: dict[str, dict[str, float]] = {"": {}, COMMON: {}, CONSIDER: {}}
+    for name, value in _entries(argument, given):
+        beside = name in (COMMON, CONSIDER)
+        if not beside and isinstance(value, Mapping):
+            raise ArgumentTypeError(
+                f"{argument} of {name}: expected a number, found {shown(value)}; a mapping stands"
+                f" under {COMMON!r} or {CONSIDER!r} only"
+            )
+        inner = _entries(f"{argument} {name}", value) if beside else [(name, value)]
+        for pattern, sigma in inner:
+            of = parts[name if beside else ""]
+            of[pattern] = number(f"{argument} of {pattern}", sigma, least=0.0)
+    return StatedUncertainty(parts[""], parts[COMMON], parts[CONSIDER])
+
+
+def _entries(argument: str, given: object) -> Iterable[tuple[str, Any]]:
+    if not isinstance(given, Mapping) or not all(isinstance(name, str) for name in given):
+        raise ArgumentTypeError(
+            f"{argument}: expected standard deviations by name, such as {{'gain*': 1e-3}}; found"
+            f" {shown(given)}"
+        )
+    return given.items()
+
+
+def _behind(first: Mapping[str, float], later: Mapping[str, float]) -> dict[str, float]:
+    return {name: s for name, s in first.items() if name not in later} | dict(later)
+
+
+def of_geometry(pattern: str, names: Iterable[str]) -> bool:
+    """Whether a pattern is of numbers of the geometry, and not of frames, points or instruments."""
+    return any(fnmatchcase(name, pattern) for name in names) or not _BESIDE.fullmatch(pattern)
+
+
+def unit_of(pattern: str, names: Mapping[str, str]) -> str:
+    """Unit of what a pattern matches: of the geometry by `names`, else by its own name.
+
+    Raises
+    ------
+    ValueError
+        Lengths, angles and ratios together.
+    """
+    units = {unit for name, unit in names.items() if fnmatchcase(name, pattern)}
+    if not units:
+        if pattern == SCALE:
+            return "1"
+        whole = pattern.rstrip("*").rstrip(".") in ("frame", "tool")
+        if whole:
+            units = {"mm", "rad"}
+        elif pattern.endswith(_ANGLES) or pattern.startswith("mounting"):
+            units = {"rad"}
+        else:
+            units = {"mm"}
+    if len(units) > 1:
+        raise ArgumentError(f"{pattern} covers lengths, angles or ratios together; name them apart")
+    return units.pop()
+
+
+def read_uncertainty(table: Table, geometry: Geometry) -> StatedUncertainty:
+    """The table ``[uncertainty]`` of a robot file, in mm and rad."""
+    units = dict(zip(geometry.names, geometry.units, strict=True))
+    parts = {
+        key: _deviations(table.table(key) if key in table else Table({}, table.source), units)
+        for key in (COMMON, CONSIDER)
+    }
+    own = {key: value for key, value in table.data.items() if key not in parts}
+    found = _deviations(Table(own, table.source, table.path, table.units), units)
+    for name in [*found, *parts[COMMON], *parts[CONSIDER]]:
+        if of_geometry(name, geometry.names):
+            try:
+                geometry.match(name)
+            except ValueError as error:
+                table.fail("", str(error), at=name)
+    return StatedUncertainty(found, parts[COMMON], parts[CONSIDER])
+
+
+def _deviations(table: Table, units: Mapping[str, str]) -> dict[str, float]:
+    found = {}
+    for name, value in table.flat():
+        try:
+            unit: Unit = unit_of(name, units)  # type: ignore[assignment]
+        except ValueError as error:
+            table.fail("", str(error), at=name)
+        sigma = table.as_number(name, value, unit)
+        if sigma < 0.0:
+            table.fail("", f"{name}: a standard deviation is not negative", at=name)
+        found[name] = sigma
+    return found

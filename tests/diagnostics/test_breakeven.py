@@ -1,0 +1,71 @@
+"""How wrong numbers that are not free may be: exact, and as draws of such machines show."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+import pkmcal as pk
+from benchmarks.bench_uncertainty import JOINTS, SCENARIOS, drawn
+from pkmcal.diagnostics.breakeven import breakeven
+
+ROBOT = pk.load("hexapod")
+
+
+def identified(kind, changes=(), seed=0, noise=0.02):
+    """Offsets of a hexapod that has these numbers."""
+    true = ROBOT.replace(dict(changes))
+    q = ROBOT.inverse(pk.sample_poses(ROBOT, 40, seed=1))
+    m = pk.VirtualMachine(true, noise=noise, seed=seed).measure(q, kind)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of residuals that are no noise
+        return pk.identify(ROBOT, m, "offset*")
+
+
+@pytest.mark.parametrize("kind", ["position", "pose"])
+def test_standard_deviations_double_where_it_says(kind):
+    """Machines of which one number after the other is wrong by as much, measured without noise."""
+    at = identified(kind)
+    found = {each.unit: each for each in at.breakeven}
+    assert found["mm"].kinds == ("base*", "platform*")
+    for unit, kinds in (("mm", ("base*", "platform*")), ("1", ("gain*",))):
+        t, squares = found[unit].deviation, 0.0
+        for name in ROBOT.geometry.match(kinds):
+            other = identified(kind, {name: ROBOT.geometry[name] + t}, noise=1e-7)
+            squares += float((other.values**2).sum())
+        assert squares == pytest.approx(3.0 * float((at.stderr**2).sum()), rel=0.02)
+
+
+def test_figures_of_the_hexapod():
+    """Of effects.md, A16, as the mean of draws with sigma as stated."""
+    for name, expected in (("joints, positions", 0.0070), ("joints, poses", 0.0054)):
+        scenario, found = SCENARIOS[name], []
+        for seed in range(12):
+            _, m = drawn(
+                type(scenario)(**{**vars(scenario), "wrong": {}}), np.random.default_rng(seed)
+            )
+            at = pk.identify(ROBOT, m, scenario.free)
+            found.append(at.breakeven[0].deviation / at.fit.uncertainty.covariance.scale)
+        assert np.mean(found) == pytest.approx(expected, rel=0.05)
+
+
+def test_what_is_stated_free_or_redundant_is_not_in_it():
+    found = identified("pose")
+    assert [each.unit for each in found.breakeven] == ["mm", "1"]
+    q = ROBOT.inverse(pk.sample_poses(ROBOT, 40, seed=1))
+    m = pk.VirtualMachine(ROBOT, noise=0.02, seed=1).measure(q, "pose")
+    stated = pk.identify(ROBOT, m, "offset*", uncertainty=JOINTS)
+    assert [each.unit for each in stated.breakeven] == ["1"]
+    everything = pk.identify(ROBOT, m, ["base*", "platform*", "offset*", "gain*"])
+    assert everything.breakeven == ()
+    # the offset of a slider and its base along it are one number
+    delta = pk.load("linear-delta-6")
+    q = delta.inverse(pk.sample_poses(delta, 30, seed=1), match=True)
+    m = pk.VirtualMachine(delta, noise=0.01, seed=1).measure(q, "position")
+    free = [n for n in delta.geometry.match("*") if n not in delta.geometry.match("offset*")]
+    assert breakeven(pk.identify(delta, m, free).fit) == ()
+
+
+def test_the_summary_says_it():
+    found = identified("pose")
+    assert "double if base*, platform* are wrong by" in found.summary().replace("\n  ", " ")

@@ -1,0 +1,128 @@
+"""What every field of the rows and every constant of an instrument obeys: it is read back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pkmcal as pk
+from pkmcal.files.csv_table import Table
+from pkmcal.files.csv_writer import WrittenColumn, write_csv
+from pkmcal.measurements.field import Field, row_fields
+from pkmcal.measurements.measurements import Measurements
+from pkmcal.readings import Position
+
+from ..readings.own import Spot
+
+ROWS, N = 5, 6
+RANDOM = np.random.default_rng(3)
+STATED: dict[str, Any] = {
+    "actuator_sigma": RANDOM.uniform(0.01, 0.1, (ROWS, N)),
+    "sigma": RANDOM.uniform(0.01, 0.1, (ROWS, 3)),
+    "target_index": [0, 1, 1, 0, 1],
+    "group": [3, 1, 4, 1, 5],
+    "session": ["a", "b", "b", "a", "c"],
+    "temperature": RANDOM.uniform(15, 25, (ROWS, N + 2)),
+    "time": RANDOM.uniform(0, 1e4, ROWS).cumsum(),
+    "approach": RANDOM.choice([-1.0, 1.0], (ROWS, N)),
+    "tension": RANDOM.uniform(10, 20, (ROWS, N)),
+    "tension_sigma": RANDOM.uniform(0.1, 0.2, (ROWS, N)),
+    "load": RANDOM.uniform(1, 2, (ROWS, 10)),
+    "lines": np.arange(2, ROWS + 2),
+}
+
+
+@pytest.mark.parametrize("name", [field.name for field in row_fields(Measurements)])
+def test_every_field_is_read_back_to_the_last_bit(name: str, tmp_path: Path) -> None:
+    beside: dict[str, Any] = {"target_index": {"target": [[1.0, 2, 3], [4, 5, 6]]}}.get(name, {})
+    beside |= {"tension_sigma": {"tension": STATED["tension"]}}.get(name, {})
+    q, values = RANDOM.uniform(300, 500, (ROWS, N)), RANDOM.normal(size=(ROWS, 3))
+    m = Measurements(q, values, **{name: STATED[name]}, **beside)
+    m.write(tmp_path / "m.csv")
+    again = pk.read_measurements(tmp_path / "m.csv")
+    if name == "target_index":  # the names of targets are written
+        np.testing.assert_array_equal(again.targets, m.targets)
+    else:
+        np.testing.assert_array_equal(getattr(again, name), getattr(m, name))
+
+
+@pytest.mark.parametrize("unit", ["", "mm", "rad", "N", "mbar", None])
+def test_a_field_that_declares_its_unit_alone_is_read_back(
+    unit: str | None, tmp_path: Path
+) -> None:
+    one = Field()
+    one.name, one.unit = "pressure", unit
+    given = np.array(["1", "low"]) if unit is None else np.array([1013.25, np.pi])
+    m = type("Rows", (), {"pressure": given})()
+    columns = list(one.columns(m, ("mm",)))
+    cells = zip(*(column.cells() for column in columns), strict=True)
+    write_csv(tmp_path / "m.csv", [column.heading for column in columns], cells)
+    found = one.read(Table(tmp_path / "m.csv"), Position(), ("mm",))
+    np.testing.assert_array_equal(found, given)
+
+
+def test_a_field_that_writes_columns_of_its_own_has_to_read_them() -> None:
+    with pytest.raises(TypeError, match="Lost: has columns of its own, and no method read"):
+
+        class Lost(Field):
+            def columns(self, m: Any, units: Any) -> Any:
+                yield WrittenColumn("lost", "", np.zeros(2))
+
+    with pytest.raises(TypeError, match="Raw: has no method kept"):
+        type("Raw", (Field,), {})
+
+
+@dataclass(frozen=True, eq=False)
+class Camera(Spot):
+    """A spot with all that an instrument may have for all its rows."""
+
+    name = "camera"
+    binning: int = 1
+    lens: str = "wide"
+    flipped: bool = False
+    focal: float | None = None
+    serial: str | None = None
+
+
+def spots(instrument: Spot) -> Measurements:
+    robot = pk.load("hexapod")
+    q = robot.inverse(pk.sample_poses(robot, 4, seed=1))
+    return pk.VirtualMachine(robot, 0.01).measure(q, instrument, [0, 0, 50])
+
+
+OTHER = Camera(0.1 / 3, 2, "long", True, 16.2, "X7")
+
+
+@pytest.mark.parametrize("frame", [False, True], ids=["file", "data frame"])
+def test_constants_of_an_instrument_are_those_of_the_file(frame: bool, tmp_path: Path) -> None:
+    m = spots(OTHER)
+    if frame:
+        pytest.importorskip("pandas")
+        again = Measurements.from_pandas(m.to_pandas(), kind=Camera())
+    else:
+        m.write(tmp_path / "m.csv")
+        again = pk.read_measurements(tmp_path / "m.csv", kind=Camera())
+    for each in fields(OTHER):
+        assert getattr(again.instrument, each.name) == getattr(OTHER, each.name), each.name
+    assert again.notes == ()
+
+
+def test_a_file_of_another_instrument_than_stated_is_refused(tmp_path: Path) -> None:
+    spots(OTHER).write(tmp_path / "m.csv")
+    with pytest.raises(pk.FileError, match=r"m.csv.*0.033.*is not pitch=0.07"):
+        pk.read_measurements(tmp_path / "m.csv", kind=Camera(0.07))
+    text = (tmp_path / "m.csv").read_text().replace("long", "wide", 1)
+    (tmp_path / "m.csv").write_text(text)
+    with pytest.raises(pk.FileError, match=r"m.csv, line 3.*an instrument has one lens"):
+        pk.read_measurements(tmp_path / "m.csv", kind=Camera())
+
+
+def test_what_no_column_can_hold_is_not_written(tmp_path: Path) -> None:
+    m = spots(replace(OTHER, lens=[1.0, 2.0]))  # type: ignore[arg-type]
+    with pytest.raises(pk.ArgumentError, match="lens of 'camera' is of class list"):
+        m.write(tmp_path / "m.csv")
+    assert not (tmp_path / "m.csv").exists()

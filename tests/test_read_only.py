@@ -1,0 +1,65 @@
+"""Arrays of results cannot be written to, so that what is stated of them stays true."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import pkmcal as pk
+from tests.driven import with_laws
+
+
+@pytest.fixture(scope="module")
+def results() -> dict[str, object]:
+    robot = pk.load("hexapod")
+    poses = pk.sample_poses(robot, 40, seed=1)
+    true = pk.VirtualMachine(robot.replace({"offset1": 0.3}), noise=0.02)
+    found = pk.identify(robot, true.measure(robot.inverse(poses)), "offset*", holdout=0.25)
+    return {
+        "identification": found,
+        "measurements": true.measure(robot.inverse(poses)),
+        "bootstrap": pk.bootstrap(found, 20),
+        "plan": pk.plan_poses(robot, poses, 8, free="offset*"),
+        "tolerance": pk.tolerance(robot, robot.home, 0.1, samples=500),
+        "sensitivity": pk.sensitivity(robot, poses[:5], cases=["offset1"]),
+        "compensation": pk.compensate(robot, poses[:5], poses[:5]),
+        "workspace": pk.workspace(robot, {"x": (-50, 50, 3)}),
+        "dexterity": pk.dexterity(robot, poses),
+        "move": pk.trajectory.move(robot, poses[0], poses[1], duration=1.0),
+    }
+
+
+def test_no_array_of_a_result_can_be_written_to(results: dict[str, object]) -> None:
+    for name, result in results.items():
+        arrays = [key for key, value in vars(result).items() if isinstance(value, np.ndarray)]
+        assert arrays, name
+        for key in arrays:
+            with pytest.raises(ValueError, match="read-only"):
+                getattr(result, key)[...] = 0.0
+    found = results["identification"]
+    assert isinstance(found, pk.Identification)
+    for key in ("values", "stderr", "covariance", "covar", "interval95", "correlation_matrix"):
+        with pytest.raises(ValueError, match="read-only"):
+            getattr(found, key)[...] = 0.0
+
+
+def test_arrays_of_the_caller_stay_his(hexapod: pk.Robot) -> None:
+    poses = pk.sample_poses(hexapod, 3, seed=1)
+    kept = pk.tolerance(hexapod, poses, 0.1, samples=100)
+    poses[0] = 0.0
+    assert poses.flags.writeable and not kept.poses.flags.writeable
+    solved = hexapod.forward(hexapod.inverse(hexapod.home)[None])
+    again = hexapod.forward(hexapod.inverse(hexapod.home)[None], out=solved)
+    assert np.shares_memory(again.pose, solved.pose)
+
+
+@pytest.mark.parametrize("laws", [True, False])
+@pytest.mark.parametrize("name", ["hexapod", "linear-delta", "linear-delta-6", "6-rus", "tricept"])
+def test_rows_of_inverse_are_contiguous(name: str, laws: bool) -> None:
+    """Whoever hands a row's pointer to C reads its numbers."""
+    robot = pk.load(name)
+    if laws:
+        robot = with_laws(robot, np.random.default_rng(1))
+    poses = robot.home + np.zeros((4, 6))
+    for q in (robot.inverse(poses), robot.inverse(poses.reshape(2, 2, 6))):
+        assert q.flags.c_contiguous and np.isfinite(q).all()
