@@ -13,7 +13,7 @@ from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.core import instruments
 from pkmcal.core.poses import compose, invert
 from pkmcal.estimation.evaluation import Evaluation
-from pkmcal.estimation.hand_eye import of_frame_and_tool, of_tool
+from pkmcal.readings.hand_eye import of_frame_and_tool, of_tool
 from pkmcal.estimation.parameters import Parameters
 from pkmcal.estimation.prediction import Prediction
 from pkmcal.measurements.measurements import Measurements
@@ -117,10 +117,12 @@ def _with_tool(
                 groups.setdefault(f, []).append((i, some))
     known = [each for each in groups if each is None or not free[each]]
     frame = (known or list(groups))[0]
-    values = np.concatenate([prediction.table.sets[i].values[rows] for i, rows in groups[frame]])
-    pose = np.concatenate(
-        [evaluation.pose[prediction.table.pose_of[i][rows]] for i, rows in groups[frame]]
-    )
+    seen, at = [], []
+    for i, rows in groups[frame]:
+        m, own = prediction.table.sets[i], evaluation.pose[prediction.table.pose_of[i]]
+        seen.append(m.instrument.places_seen(m, own)[rows])
+        at.append(own[rows])
+    values, pose = np.concatenate(seen), np.concatenate(at)
     if frame is None:
         return {tool: of_tool(values, pose)}
     if free[frame]:
