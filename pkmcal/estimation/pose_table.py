@@ -235,6 +235,7 @@ def _commands(
                 *(m.other for m in sets if m.other is not None),
             ]
         ),
+        "picture": _pictures(sets, sources),
         "sigma": np.concatenate(noises) if noises else None,
         "approach": approach,
         "tension": tension if cells is None else _blank(cells.read),
@@ -242,6 +243,19 @@ def _commands(
         "load": load,
     }
     return {name: part for name, part in given.items() if part is not None}
+
+
+def _pictures(
+    sets: Sequence[Measurements], sources: Sequence[Measurements]
+) -> FloatArray | None:
+    """Number of the picture of each row (N, 1): no two are at one pose, wherever actuators read.
+
+    None where no set of pictures says which rows are of one.
+    """
+    if not any(m.instrument.tells_actuators and m.group is not None for m in sets):
+        return None
+    numbers = [np.full(len(m), -1) if m.group is None else m.group for m in sources]
+    return np.concatenate(numbers).astype(np.float64)[:, None]
 
 
 def _blank(tension: FloatArray) -> FloatArray:

@@ -46,7 +46,8 @@ _LEAST = 1e-9  # of what a number of the lens moves pixels by, where it moves no
 class Camera(Reading):
     """Pixels of the corners of a board, a row for each corner: u right, v down.
 
-    (0, 0) is the centre of the first pixel. Rows at the same actuators are of one picture.
+    (0, 0) is the centre of the first pixel. Rows of one `group` are of one picture, or where none
+    is stated rows at the same actuators.
 
     Attributes
     ----------
@@ -320,13 +321,15 @@ class Camera(Reading):
 
     def _pictures(self, m: Measured) -> IntArray:
         """Which picture each row is of, (N,), counted from 0."""
+        if m.group is not None:
+            return np.unique(m.group, return_inverse=True)[1].reshape(-1)
         return np.unique(m.actuators, axis=0, return_inverse=True)[1].reshape(-1)
 
     # tables ---------------------------------------------------------------------------------------
 
     def found_in(self, table: Table) -> list[str]:
         """Columns u and v."""
-        return ["u, v"] if {"u", "v"} & table.columns.keys() else []
+        return ["u, v"] if {"u", "v"} <= table.columns.keys() else []
 
     def names(self, table: Table) -> set[str]:
         """Pixels, and the numbers of corners."""
