@@ -245,9 +245,7 @@ def _commands(
     return {name: part for name, part in given.items() if part is not None}
 
 
-def _pictures(
-    sets: Sequence[Measurements], sources: Sequence[Measurements]
-) -> FloatArray | None:
+def _pictures(sets: Sequence[Measurements], sources: Sequence[Measurements]) -> FloatArray | None:
     """Number of the picture of each row (N, 1): no two are at one pose, wherever actuators read.
 
     None where no set of pictures says which rows are of one.

@@ -16,7 +16,7 @@ import numpy as np
 from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.core import instruments, screws
 from pkmcal.readings import orientation
-from pkmcal.readings.alignment import frame_of, nearest_rotations
+from pkmcal.readings.alignment import nearest_rotations
 
 _UNBENDING = 20  # rounds of undoing the distortion
 _STEPS = 30  # of Levenberg and Marquardt
@@ -75,7 +75,7 @@ def unbent(pixel: FloatArray, lens: FloatArray) -> FloatArray:
     """Directions x/z, y/z (N, 2) of pixels (N, 2): the distortion undone; NaN where it folds."""
     bent = (pixel - lens[:, 2:4]) / lens[:, :2]
     corner, level = np.zeros((len(pixel), 3)), np.zeros((len(pixel), 6))
-    found = bent.copy()
+    found: FloatArray = bent.copy()
     for _ in range(_UNBENDING):
         level[:, :2], level[:, 2] = found, 1.0
         seen, by_twist, *_ = instruments.pixels(level, corner, lens)

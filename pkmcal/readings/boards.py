@@ -17,11 +17,11 @@ from pkmcal.files.csv_table import Table
 from pkmcal.readings import rows
 
 Print = Literal["chessboard", "charuco", "apriltags", "points"]
-_FORMS = {
-    "chessboard": "chessboard:COLUMNSxROWS,SQUARE, of inner corners",
-    "charuco": "charuco:COLUMNSxROWS,SQUARE,MARKER,DICTIONARY, of squares",
-    "apriltags": "apriltags:COLUMNSxROWS,TAG,GAP,FAMILY, of tags",
-}
+_FORMS = (
+    "chessboard:COLUMNSxROWS,SQUARE of inner corners",
+    "charuco:COLUMNSxROWS,SQUARE,MARKER,DICTIONARY of squares",
+    "apriltags:COLUMNSxROWS,TAG,GAP,FAMILY of tags",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +91,7 @@ class Board:
         shape, sizes = _shape(columns, rows, 3), _sizes(square=square, marker=marker)
         if marker >= square:
             raise ArgumentError(f"marker must be smaller than the square of {square:g} mm")
-        places = (_grid(columns - 1, rows - 1) + [1.0, 1.0, 0.0]) * square
+        places = (_grid(columns - 1, rows - 1) + np.array([1.0, 1.0, 0.0])) * square
         return _board("charuco", places, shape, sizes, dictionary)
 
     @staticmethod
@@ -160,14 +160,17 @@ class Board:
         try:
             columns, rows_ = (int(each) for each in size.lower().split("x"))
             if kind == "chessboard":
-                (square,) = map(float, others)
+                (square,) = (float(each) for each in others)
                 return Board.chessboard(columns, rows_, square)
             first, second, dictionary = others
-            make = {"charuco": Board.charuco, "apriltags": Board.apriltags}[kind]
-        except (KeyError, ValueError):
-            forms = "; ".join(_FORMS.values())
+            lengths = float(first), float(second)
+            if kind not in ("charuco", "apriltags"):
+                raise ValueError(kind)
+        except ValueError:
+            forms = "; ".join(_FORMS)
             raise ArgumentError(f"board: expected {forms}, in mm; found {shown(word)}") from None
-        return make(columns, rows_, _mm(first), _mm(second), dictionary)
+        make = Board.charuco if kind == "charuco" else Board.apriltags
+        return make(columns, rows_, *lengths, dictionary)
 
     def at(self, ids: ArrayLike) -> FloatArray:
         """Places (N, 3), mm, of corners by their numbers (N,).
@@ -219,10 +222,3 @@ def _sizes(**given: float) -> tuple[float, ...]:
         if not number(name, value) > 0:
             raise ArgumentError(f"{name} must be above 0 mm; found {value!r}")
     return tuple(map(float, given.values()))
-
-
-def _mm(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        raise ArgumentError(f"board: expected a length in mm, found {text!r}") from None

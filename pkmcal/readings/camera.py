@@ -76,7 +76,8 @@ class Camera(Reading):
     >>> import pkmcal as pk
     >>> robot = pk.load("hexapod")
     >>> board = pk.readings.Board.chessboard(5, 4, square=30)
-    >>> camera = pk.readings.Camera(fx=3000, fy=3000, cx=1200, cy=1000, stands=[0, 0, 2500, 3, 0, 0])
+    >>> stands = [0, 0, 2500, 3, 0, 0]
+    >>> camera = pk.readings.Camera(fx=3000, fy=3000, cx=1200, cy=1000, stands=stands)
     >>> q, seeing = camera.seeing(robot.inverse([[0, 0, 850, 0, 0, 0]]), board)
     >>> pk.VirtualMachine(robot, 0.0).measure(q, seeing).values[0].round(3)
     array([1200., 1000.])
@@ -161,8 +162,7 @@ class Camera(Reading):
         outer, near = screws.frames(np.stack([at.origin, frame]))
         base, moved = outer @ near, screws.frames(at.pose)
         mounted, within = (
-            screws.frames(np.ascontiguousarray(each.reshape(-1, 6)))
-            for each in (tool_origin, tool)
+            screws.frames(np.ascontiguousarray(each.reshape(-1, 6))) for each in (tool_origin, tool)
         )
         to_mounting = base @ moved @ mounted
         board, to_board = to_mounting @ within, None

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.core.poses import compose
 from pkmcal.readings import orientation
 from pkmcal.readings.hand_eye import of_frame_and_tool
@@ -27,7 +27,7 @@ def in_agreement(seen: FloatArray, pose: FloatArray) -> FloatArray:
 
     The second place is NaN where there is but one.
     """
-    doubtful = np.isfinite(seen[:, 1]).all(axis=1)
+    doubtful: BoolArray = np.asarray(np.isfinite(seen[:, 1]).all(axis=1))
     chosen = np.zeros(len(seen), dtype=np.intp)
     if not doubtful.any() or len(seen) < 3:
         return _taken(seen, chosen)
