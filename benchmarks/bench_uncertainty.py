@@ -3,7 +3,8 @@
 Five kinds of errors of a hexapod that its rigid model does not have: base and platform joints wrong
 by 0.6 of the noise, read as positions or as poses; gains wrong by 1 per mille; play of 0.1 mm whose
 direction was not recorded; three targets that lean alike. Each machine is identified twice, without
-a statement and with the true one.
+a statement and with the true one. Then statements that are wrong: twice as large as they should be,
+made of what is right, and contradicted by one number that is four deviations off.
 
     python -m benchmarks.bench_uncertainty [RUNS [SCENARIO ...]]
 """
@@ -13,7 +14,7 @@ from __future__ import annotations
 import sys
 import warnings
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -49,6 +50,8 @@ class Scenario:
         Whether the noise is stated.
     play, lean : float
         Half the play of each drive, and how far all targets lean, mm.
+    stated_play : float, optional
+        What is stated of the play, where it is not the truth.
     """
 
     free: tuple[str, ...]
@@ -59,6 +62,7 @@ class Scenario:
     sigma: bool = False
     play: float = 0.0
     lean: float = 0.0
+    stated_play: float | None = None
 
 
 JOINTS = {"base*": 0.6 * NOISE, "platform*": 0.6 * NOISE}
@@ -84,15 +88,18 @@ class Tally:
     actual: float
     stated: float
     doubted: bool
+    named: frozenset[str]
 
 
-def drawn(scenario: Scenario, random: np.random.Generator) -> tuple[pk.Robot, pk.Measurements]:
-    """A machine with errors, and what is measured of it."""
+def drawn(
+    scenario: Scenario, random: np.random.Generator, off: Mapping[str, float] | None = None
+) -> tuple[pk.Robot, pk.Measurements]:
+    """A machine with errors, some of them as in `off`, and what is measured of it."""
     geometry = ROBOT.geometry
     changes = {n: geometry[n] + random.normal(0.0, 0.2) for n in geometry.match(scenario.free)}
     for pattern, sigma in scenario.wrong.items():
         changes |= {n: geometry[n] + random.normal(0.0, sigma) for n in geometry.match(pattern)}
-    true = ROBOT.replace(changes)
+    true = ROBOT.replace(changes | {n: geometry[n] + error for n, error in (off or {}).items()})
     places = ROBOT.home + ABOVE + random.uniform(-1.0, 1.0, (scenario.poses, 6)) * SPREAD
     q = ROBOT.inverse(places)
     pose = true.forward(q + scenario.play * random.choice([-1.0, 1.0], q.shape)).pose
@@ -103,7 +110,8 @@ def read(
     scenario: Scenario, q: FloatArray, pose: FloatArray, random: np.random.Generator
 ) -> pk.Measurements:
     """What an instrument reads at poses (N, 6)."""
-    about = {"actuator_sigma": scenario.play} if scenario.play else {}
+    stated = scenario.play if scenario.stated_play is None else scenario.stated_play
+    about = {"actuator_sigma": stated} if scenario.play else {}
     motion = pk.screw.from_pose(pose)
     if scenario.kind == "pose":
         small = pk.screw.from_pose(
@@ -149,16 +157,27 @@ def tally(scenario: Scenario, true: pk.Robot, found: pk.Identification) -> Tally
         actual=float(np.mean((off**2).sum(axis=1))),
         stated=float(np.mean(found.accuracy(at) ** 2)),
         doubted=found.verdict.state != "calibrated",
+        named=frozenset(
+            word.strip(":,")
+            for said in found.verdict.said
+            if said.check == "uncertainty-contradicted"
+            for word in said.text.split()
+        ),
     )
 
 
 def runs(
-    scenario: Scenario, count: int, stated: Mapping[str, Any], play: bool = True, first: int = 0
+    scenario: Scenario,
+    count: int,
+    stated: Mapping[str, Any],
+    play: bool = True,
+    first: int = 0,
+    off: Mapping[str, float] | None = None,
 ) -> list[Tally]:
     """Calibrations of `count` machines with this statement."""
     done = []
     for k in range(first, first + count):
-        true, measured = drawn(scenario, np.random.default_rng(k))
+        true, measured = drawn(scenario, np.random.default_rng(k), off)
         if not play and scenario.play:
             measured = pk.Measurements(measured.actuators, measured.values, "pose")
         with warnings.catch_warnings():
@@ -188,6 +207,38 @@ def shown(name: str, done: list[Tally]) -> str:
     )
 
 
+def wrongly_stated(count: int) -> None:
+    """Print what statements do that are too large, needless or contradicted."""
+    for name in ("joints, positions", "joints, poses", "gains", "play", "leaning targets"):
+        scenario = SCENARIOS[name]
+        if scenario.play:  # the statement is that of the actuators
+            scenario = replace(scenario, stated_play=2.0 * scenario.play)
+        done = runs(scenario, count, doubled(scenario.stated))
+        print(shown(f"{name}, stated twice as large", done), flush=True)
+    right = replace(SCENARIOS["gains"], wrong={})
+    for words, stated in (("nothing stated", {}), ("needlessly stated", GAINS)):
+        print(shown(f"gains that are right, {words}", runs(right, count, stated)), flush=True)
+    for name, number, error in (
+        ("gains", "gain3", 4e-3), ("joints, poses", "base2.x", 4.0 * 0.6 * NOISE),
+    ):  # fmt: skip
+        scenario = SCENARIOS[name]
+        off = runs(scenario, count, scenario.stated, off={number: error})
+        on = runs(scenario, count, scenario.stated)
+        print(
+            f"{name}, {number} off by four deviations: named {sum(number in t.named for t in off)}"
+            f" of {count}; any named falsely {sum(bool(t.named) for t in on)} of {count}",
+            flush=True,
+        )
+
+
+def doubled(stated: Mapping[str, Any]) -> dict[str, Any]:
+    """A statement with deviations twice as large."""
+    return {
+        name: doubled(each) if isinstance(each, Mapping) else 2.0 * each
+        for name, each in stated.items()
+    }
+
+
 def main() -> None:
     """Print the table."""
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 200
@@ -195,6 +246,8 @@ def main() -> None:
         scenario = SCENARIOS[name]
         print(shown(f"{name}, nothing stated", runs(scenario, count, {}, play=False)), flush=True)
         print(shown(f"{name}, stated", runs(scenario, count, scenario.stated)), flush=True)
+    if not sys.argv[2:]:
+        wrongly_stated(count)
 
 
 if __name__ == "__main__":

@@ -24,6 +24,10 @@ class ArgumentTypeError(ArgumentError, TypeError):
     """An argument of a type that is not taken; the message names it and says what was found."""
 
 
+class FitError(ArgumentError):
+    """Measurements that no geometry near the present one agrees with; the message says which."""
+
+
 class FileError(ArgumentError):
     """What a file says makes no sense; the message names the file and, where it can, the line."""
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -12,6 +14,9 @@ from typer.testing import CliRunner
 
 import pkmcal as pk
 from pkmcal.cli.verbs import app
+
+# Folders of the sources beside the package, such as wheels; last, for pkmcal is the installed one.
+sys.path.append(str(Path(__file__).resolve().parents[1]))
 
 # No test is of wall time: other work may take all cores.
 settings.register_profile("pkmcal", deadline=None, suppress_health_check=[HealthCheck.too_slow])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from os import PathLike
 from pathlib import Path
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal import screw
+from pkmcal.arguments import instance, number
 from pkmcal.arms import arm_file
 from pkmcal.arms.denavit_hartenberg import (
     Convention,
@@ -23,11 +24,13 @@ from pkmcal.arms.denavit_hartenberg import (
 )
 from pkmcal.arms.inputs import motion
 from pkmcal.arms.joint_laws import JointLaws, Term
+from pkmcal.arms.joint_pulls import AtTool, JointPulls
 from pkmcal.arms.serial_chain import SerialChain
 from pkmcal.arrays import FloatArray, as_rows
 from pkmcal.display import Table, fixed
 from pkmcal.exceptions import ArgumentError, FileError
 from pkmcal.files.reading import Input
+from pkmcal.geometry.carried import Load
 from pkmcal.result import Result
 
 _SAME = 1e-9  # mm, and mm per rad: by so much the arm of a source may differ
@@ -66,6 +69,8 @@ class SerialArm(SerialChain, Result):
     laws : JointLaws, optional
         What its joints add to their commands: sag, gears, coupled axes. Files and
         `identify(effects=…)` give them.
+    uncertainty : mapping of str to float, optional
+        How wrong numbers may be that a calibration does not look for, as `identify` takes it.
 
     Raises
     ------
@@ -205,6 +210,7 @@ class SerialArm(SerialChain, Result):
             name=self.name,
             joint_names=self.joint_names,
             laws=self.laws,
+            uncertainty=self.uncertainty.table(),
         )
 
     @property
@@ -219,8 +225,12 @@ class SerialArm(SerialChain, Result):
 
     def with_terms(self, terms: Iterable[Term]) -> SerialArm:
         """The arm with these numbers among those of its joints, 0 where they are new."""
-        laws = self.laws or JointLaws(self.axes, self.points, self.kinds, {})
-        return self.with_laws(laws.with_terms(terms))
+        return self.with_laws(self.joint_laws.with_terms(terms))
+
+    @property
+    def joint_laws(self) -> JointLaws:
+        """Its laws; without numbers where it has none."""
+        return self.laws or JointLaws(JointPulls(self.axes, self.points, self.kinds))
 
     def approaching(self, approach: ArrayLike) -> SerialArm:
         """The arm with joints that come from below or above, which backlash depends on.
@@ -237,6 +247,75 @@ class SerialArm(SerialChain, Result):
         if self.laws is None:
             return self
         return self.with_laws(self.laws.approaching(rows[0] if shape == () else rows))
+
+    def under(self, load: Load | None) -> SerialArm:
+        """The arm with what its tool carries, which joints with a compliance follow.
+
+        Parameters
+        ----------
+        load : Load or None
+            One for all rows of the calls that follow, or one for each of as many rows: the centre
+            of its mass in the frame of the tool, forces and moments in the axes of the base. None:
+            nothing is carried.
+
+        Examples
+        --------
+        >>> import pkmcal as pk
+        >>> arm = pk.SerialArm([[0, 1, 0]], [[0, 0, 0]], [600, 0, 0, 0, 0, 0])
+        >>> soft = arm.yielding({1: 1 / 50e6})  # 50 kN m/rad
+        >>> soft.under(pk.Load(mass=10)).forward([0.0])[:3, 3].round(4).tolist()
+        [599.9996, 0.0, -0.7061]
+        """
+        if self.laws is None:
+            return self
+        if load is None:
+            return self.with_laws(self.laws.under(None))
+        rows = load.rows(None)
+        centre = rows[..., 1:4] @ self._home[:3, :3].T + self._home[:3, 3]
+        tool = self._home[:3, 3]
+        carried = AtTool(rows[..., :1], centre, tool, rows[..., 4:7], rows[..., 7:10])
+        return self.with_laws(self.laws.under(carried))
+
+    def yielding(self, compliance: Mapping[int, float]) -> SerialArm:
+        """The arm with joints that yield to the weights of its links and to what it carries.
+
+        Parameters
+        ----------
+        compliance : mapping of int to float
+            rad/(N mm) by the joint, counted from 1: 1e-3 over a stiffness in N m/rad. Others stay.
+
+        Returns
+        -------
+        SerialArm
+            Masses and centres of the links are those of its file or URDF; without any they are 0,
+            and joints yield to what the tool carries alone.
+
+        Raises
+        ------
+        ValueError, TypeError
+            A joint that it has not, an arm with slides, a compliance below 0.
+        """
+        laws = self.weighed().joint_laws
+        values = dict(laws.numbers)
+        for joint, each in compliance.items():
+            if not 1 <= instance("joint", joint, int) <= self.n_joints:
+                raise ArgumentError(f"compliance: joints are 1 to {self.n_joints}; found {joint}")
+            values[Term(joint - 1, "compliance")] = number("compliance", each, least=0.0)
+        laws = laws.with_terms(values)
+        return self.with_laws(laws.with_values(np.array([values[term] for term in laws.terms])))
+
+    def weighed(self) -> SerialArm:
+        """The arm with masses and centres of its links: its own, those of its URDF, or 0."""
+        laws = self.joint_laws
+        if laws.pulls.weighed:
+            return self
+        if self.source is None:
+            masses, centres = np.zeros(self.n_joints), self.points
+        else:
+            from pkmcal.arms import urdf
+
+            masses, centres = urdf.weights(*self.source)
+        return self.with_laws(laws.weighing(masses, centres))
 
     def error_motions(self) -> FloatArray:
         """The motions E by its joint errors, in the base (eq. 10 and 18), (n, 4, 4)."""

@@ -10,6 +10,7 @@ import numpy as np
 
 from pkmcal import arguments, screw
 from pkmcal.arms import joint_law_file
+from pkmcal.arms.arm_geometry import arm_geometry
 from pkmcal.arms.inputs import ERRORS, KINDS, ArmArguments, kinds_of
 from pkmcal.arrays import FloatArray, Unit
 from pkmcal.core.library import COORDINATE_UNITS, POSE
@@ -18,8 +19,9 @@ from pkmcal.files.toml_lines import Source
 from pkmcal.files.toml_table import Table, shown
 from pkmcal.geometry import robot_file
 from pkmcal.geometry.robot_file_writer import lines
+from pkmcal.geometry.stated_uncertainty import read_uncertainty
 
-TOP = ("name", "units", "gravity", "tool", "joint")
+TOP = ("name", "units", "gravity", "tool", "uncertainty", "joint")
 HEADER = "# A serial arm for pkmcal, at zero: lengths in mm, angles in rad.\n"
 
 
@@ -50,16 +52,20 @@ def parse(source: Source) -> ArmArguments:
     )
     axes = np.array([joint.vector("axis") for joint in joints])
     points = np.array([_point(joint) for joint in joints])
+    errors = np.array([_error(joint) for joint in joints])
+    laws = joint_law_file.read(top, joints, axes, points, kinds)
+    stated = top.table("uncertainty") if "uncertainty" in top else Table({}, source)
     return {
         "axes": axes,
         "points": points,
         "home": _home(tool),
         "kinds": kinds,
         "name": top.text("name"),
-        "joint_errors": np.array([_error(joint) for joint in joints]),
+        "joint_errors": errors,
         "joint_names": _names(joints),
         "source": None,
-        "laws": joint_law_file.read(top, joints, axes, points, kinds),
+        "laws": laws,
+        "uncertainty": read_uncertainty(stated, arm_geometry(errors, laws)).table(),
     }
 
 
@@ -74,8 +80,10 @@ def write(arm: ArmArguments, path: str | os.PathLike[str], comment: str = "") ->
     head: dict[str, Any] = {"name": arm["name"], "units": {"length": "mm", "angle": "rad"}}
     laws = arm["laws"]
     if laws is not None:
-        head["gravity"] = list(laws.gravity)
+        head["gravity"] = list(laws.pulls.gravity)
     blocks = [HEADER, lines(head), "[tool]\n" + lines({"home": arm["home"][:3].tolist()})]
+    if arm["uncertainty"]:
+        blocks.append("[uncertainty]\n" + lines(arm["uncertainty"]))
     for i, kind in enumerate(arm["kinds"]):
         joint: dict[str, Any] = {}
         if arm["joint_names"] is not None:

@@ -15,6 +15,7 @@ from pkmcal.arrays import FloatArray, as_numbers, as_rows, furthest_axis
 from pkmcal.core.screws import FRAMES
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.toml_table import unit_vector
+from pkmcal.geometry.stated_uncertainty import Uncertain
 
 Frame = Literal["space", "body", "tip"]
 JointKind = Literal["revolute", "prismatic"]
@@ -42,6 +43,7 @@ class ArmArguments(TypedDict):
     joint_names: tuple[str, ...] | None
     source: Source | None
     laws: JointLaws | None
+    uncertainty: Uncertain
 
 
 def names_of(given: Sequence[str] | None, joints: int) -> tuple[str, ...] | None:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from pkmcal import screw
 from pkmcal.arguments import word
 from pkmcal.arms.inputs import Frame, checked_errors
-from pkmcal.arrays import FloatArray, Int32Array, Unit, as_rows, mm_per_unit, wrapped
+from pkmcal.arrays import FloatArray, Int32Array, IntArray, Unit, as_rows, mm_per_unit, wrapped
 from pkmcal.core.library import STATUS
 from pkmcal.display import Table, displayed, fixed, long_table
 from pkmcal.exceptions import ArgumentError
@@ -40,6 +40,9 @@ class Solvable(Protocol):
     @property
     def actuator_units(self) -> tuple[Unit, ...]:
         """Unit of each joint coordinate."""
+
+    def of_rows(self, rows: IntArray) -> Solvable:
+        """The arm in the state that it has in some rows of a call."""
 
     def forward(self, theta: ArrayLike, joint_errors: ArrayLike | None = None) -> FloatArray:
         """Where the tool is, (..., 4, 4)."""
@@ -161,7 +164,7 @@ class _Search:
 
     def remaining(self, theta: FloatArray, rows: np.ndarray) -> FloatArray:
         """Twist to the target, in base axes: rotation as its arc, position, mm (N, k)."""
-        tool = self.arm.forward(theta, self.errors_of(rows))
+        tool = self.arm.of_rows(rows).forward(theta, self.errors_of(rows))
         turn = np.zeros_like(tool)
         turn[:, :3, :3] = self.goal[rows, :3, :3] @ tool[:, :3, :3].transpose(0, 2, 1)
         turn[:, 3, 3] = 1.0
@@ -190,7 +193,9 @@ class _Search:
             rows = everyone[(status == _NOT_CONVERGED) & (damping < _LARGEST)]
             if not rows.size:
                 break
-            jacobian = self.arm.jacobian(theta[rows], self.errors_of(rows), frame="tip")
+            jacobian = self.arm.of_rows(rows).jacobian(
+                theta[rows], self.errors_of(rows), frame="tip"
+            )
             jacobian[:, :3] *= self.length
             J = jacobian[:, self.parts] / self.travel
             k = J.shape[1]

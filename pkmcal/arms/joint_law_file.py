@@ -8,12 +8,13 @@ from typing import Any, Literal
 import numpy as np
 
 from pkmcal.arms.joint_laws import AXES, JointLaws, Term, sag_term
+from pkmcal.arms.joint_pulls import Balancer, JointPulls
 from pkmcal.arrays import FloatArray, Unit
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.toml_table import Table
 from pkmcal.geometry.elastic import GRAVITY
 
-KEYS = ("drive", "mass", "centre")
+KEYS = ("drive", "mass", "centre", "stiffness", "balancer")
 _DRIVE = ("sag", "compliance", "harmonics", "coupled", "backlash")
 
 
@@ -34,7 +35,7 @@ def read(
     gravity = top.list_of("gravity", 3, "three numbers") if "gravity" in top else GRAVITY
     x, y, z = (top.as_number("gravity", each, "1") for each in gravity)
     weighed = [joint for joint in joints if "mass" in joint or "centre" in joint]
-    if not any("drive" in joint for joint in joints) and not weighed and "gravity" not in top:
+    if not any(key in joint for joint in joints for key in KEYS) and "gravity" not in top:
         return None
     masses = centres = None
     if weighed:
@@ -42,20 +43,27 @@ def read(
         centres = np.array([_centre(joint, at) for joint, at in zip(joints, points, strict=True)])
         if (masses < 0.0).any():
             joints[int(np.argmax(masses < 0.0))].fail("mass", "must not be negative")
+    balancers = {
+        i: _balancer(joint.table("balancer"), kinds[i])
+        for i, joint in enumerate(joints)
+        if "balancer" in joint
+    }
     numbers: dict[Term, float] = {}
-    laws = JointLaws(axes, points, kinds, {}, (x, y, z), masses, centres)
+    laws = JointLaws(JointPulls(axes, points, kinds, (x, y, z), masses, centres, balancers))
     for i, joint in enumerate(joints):
         for term, value in _terms(i, joint, kinds):
             numbers[term] = value
             try:
                 laws = laws.with_terms([term])
             except ArgumentError as error:
-                joint.fail("drive", str(error))
+                joint.fail("stiffness" if "stiffness" in joint else "drive", str(error))
     return laws.with_values(np.array([numbers[term] for term in laws.terms]))
 
 
 def _terms(i: int, joint: Table, kinds: Sequence[str]) -> Iterator[tuple[Term, float]]:
     """The numbers of a joint's law."""
+    if "stiffness" in joint:
+        yield Term(i, "compliance"), _compliance(joint)
     if "drive" not in joint:
         return
     drive, own = joint.table("drive"), _unit(kinds[i])
@@ -69,6 +77,8 @@ def _terms(i: int, joint: Table, kinds: Sequence[str]) -> Iterator[tuple[Term, f
             if name in sag:
                 yield sag_term(i, link, axis), sag.number(name, "rad")
     if "compliance" in drive:
+        if "stiffness" in joint:
+            drive.fail("compliance", "is stated as the joint's stiffness already")
         yield Term(i, "compliance"), drive.number("compliance", "rad/(N mm)")
     for wave in drive.tables("harmonics", "the key") if "harmonics" in drive else []:
         wave.only(("k", "cos", "sin"), "a harmonic")
@@ -104,8 +114,12 @@ def keys(laws: JointLaws, i: int) -> dict[str, Any]:
             case _:
                 drive[term.kind] = value
     found: dict[str, Any] = {}
-    if laws.masses is not None and laws.centres is not None:
-        found = {"mass": float(laws.masses[i]), "centre": laws.centres[i].tolist()}
+    pulls = laws.pulls
+    if pulls.masses is not None and pulls.centres is not None:
+        found = {"mass": float(pulls.masses[i]), "centre": pulls.centres[i].tolist()}
+    if i in pulls.balancers:
+        spring = pulls.balancers[i]._asdict()
+        found["balancer"] = spring | {"base": [*spring["base"]], "link": [*spring["link"]]}
     return found | ({"drive": drive} if drive else {})
 
 
@@ -121,6 +135,30 @@ def _entry(drive: dict[str, Any], key: str, by: str, value: float) -> dict[str, 
 
 def _unit(kind: str) -> Unit:
     return "rad" if kind == "revolute" else "mm"
+
+
+def _compliance(joint: Table) -> float:
+    """rad/(N mm) of a joint whose stiffness is in N m/rad."""
+    stiffness = joint.number("stiffness", "1")
+    if not stiffness > 0.0:
+        joint.fail("stiffness", f"must be above 0 N m/rad, found {stiffness:g}")
+    return 1e-3 / stiffness
+
+
+def _balancer(table: Table, kind: str) -> Balancer:
+    """A spring between points at zero in the base; its rate is in N/mm."""
+    table.only(("base", "link", "rate", "free"), "a balancer")
+    if kind != "revolute":
+        table.fail("", "is of a joint that turns")
+    bx, by, bz, lx, ly, lz = (
+        table.as_number(key, value, "mm")
+        for key in ("base", "link")
+        for value in table.list_of(key, 3, "three coordinates")
+    )
+    rate = table.number("rate", "1")
+    if rate < 0.0:
+        table.fail("rate", f"must not be negative, found {rate:g}")
+    return Balancer((bx, by, bz), (lx, ly, lz), rate, table.number("free", "mm"))
 
 
 def _centre(joint: Table, point: FloatArray) -> list[float]:

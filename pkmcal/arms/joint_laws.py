@@ -4,7 +4,8 @@ Of each joint q̃ = q + Σ v φ(q), linear in numbers v that are given or identi
 
     sag by products   φ = z·(R e × ĝ): the torque of gravity about the joint by a unit moment of a
                       link; v is by how much such a moment turns the joint, rad
-    compliance        φ = the torque of gravity about the joint by known masses, N mm
+    compliance        φ = the torque about the joint by known masses and by what the tool carries,
+                      N mm
     harmonics         φ = cos k q and sin k q, k waves a turn
     coupling          φ = another joint's command
     backlash          φ = ∓ 1/2, where the joint's reading had grown or fallen
@@ -22,10 +23,10 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from pkmcal.arms.joint_pulls import AtTool, JointPulls, Posture
 from pkmcal.arrays import FloatArray, IntArray, Unit
 from pkmcal.core import screws
 from pkmcal.exceptions import ArgumentError
-from pkmcal.geometry.elastic import GRAVITY
 
 TermKind = Literal["sag", "compliance", "cos", "sin", "coupling", "backlash"]
 KINDS: tuple[TermKind, ...] = ("sag", "compliance", "cos", "sin", "coupling", "backlash")
@@ -73,26 +74,34 @@ def sag_term(joint: int, link: int, axis: int) -> Term:
 
 
 class Memo:
-    """φ at the coordinates that were asked for last, which no other numbers of a law change.
+    """φ as it was asked for last, which no other numbers of a law change.
 
-    A search asks for the same ones at each step.
+    A search asks for the same at each step.
     """
 
     def __init__(self) -> None:
-        self._last: tuple[FloatArray, FloatArray] | None = None
+        self._last: tuple[tuple[FloatArray | None, ...], FloatArray] | None = None
 
-    def of(self, theta: FloatArray) -> FloatArray | None:
-        """φ at these coordinates, where it is known."""
+    def of(self, *key: FloatArray | None) -> FloatArray | None:
+        """φ of these coordinates and this state, where it is known."""
         last = self._last
-        return last[1] if last is not None and np.array_equal(last[0], theta) else None
+        if last is None or not all(map(_equal, last[0], key)):
+            return None
+        return last[1]
 
-    def keep(self, theta: FloatArray, basis: FloatArray) -> None:
-        """Know φ at these coordinates; who is given it changes nothing of it."""
+    def keep(self, basis: FloatArray, *key: FloatArray | None) -> None:
+        """Know φ of these coordinates and this state; who is given it changes nothing of it."""
         basis.flags.writeable = False
-        self._last = theta.copy(), basis
+        self._last = tuple(None if each is None else each.copy() for each in key), basis
 
     def __reduce__(self) -> tuple[type[Memo], tuple[()]]:
         return Memo, ()
+
+
+def _equal(one: FloatArray | None, other: FloatArray | None) -> bool:
+    if one is None or other is None:
+        return one is other
+    return np.array_equal(one, other)
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,61 +110,45 @@ class JointLaws:
 
     Parameters
     ----------
-    axes : ndarray (n, 3)
-        Directions of the joints' axes at zero, in the base.
-    points : ndarray (n, 3)
-        A point on each, mm.
-    kinds : tuple of str, n
-        "revolute" or "prismatic".
+    pulls : JointPulls
+        The joints, and what pulls at them; compliances need the masses of the links.
     numbers : mapping of Term to float
         rad and mm, of couplings ratios, of compliances rad/(N mm).
-    gravity : sequence of float
-        m/s², in the axes of the base.
-    masses : ndarray (n,) or None
-        Of the link behind each joint, kg; compliances need them.
-    centres : ndarray (n, 3) or None
-        Their centres at zero, in the base, mm.
     approach : ndarray (n,) or (N, n), or None
         +1 where a joint's reading had grown, -1 where it had fallen, 0 where that is not known.
     memo : Memo
         Of φ; shared by laws that differ in the values of their numbers alone.
     """
 
-    axes: FloatArray
-    points: FloatArray
-    kinds: tuple[str, ...]
-    numbers: Mapping[Term, float]
-    gravity: tuple[float, float, float] = GRAVITY
-    masses: FloatArray | None = None
-    centres: FloatArray | None = None
+    pulls: JointPulls
+    numbers: Mapping[Term, float] = field(default_factory=dict)
     approach: FloatArray | None = None
     memo: Memo = field(default_factory=lambda: Memo())
 
     def __post_init__(self) -> None:
-        n = len(self.axes)
         for term in self.numbers:
-            self._check(term, n)
+            self._check(term, self._n)
         if not np.isfinite(list(self.numbers.values())).all():
             raise ArgumentError("laws of joints: their numbers must be finite")
-        if self._pulled and not float(np.linalg.norm(self.gravity)) > 0.0:
+        if self._sagging and not self.pulls.directed:
             raise ArgumentError("gravity: must have a direction, found 0 0 0")
 
     def _check(self, term: Term, n: int) -> None:
-        revolute = self.kinds[term.joint] == "revolute"
+        revolute = self.pulls.kinds[term.joint] == "revolute"
         if term.kind in ("sag", "compliance") and not revolute:
             raise ArgumentError(f"{term.name}: joint {term.joint + 1} slides, no moment turns it")
         if term.kind == "sag" and not term.joint <= int(term.of) // 3 < n:
             raise ArgumentError(f"{term.name}: the link must be behind the joint, one of {n}")
-        if term.kind == "compliance" and (self.masses is None or self.centres is None):
+        if term.kind == "compliance" and not self.pulls.weighed:
             raise ArgumentError(f"{term.name}: needs the mass and the centre of each link")
-        if term.kind == "compliance" and "prismatic" in self.kinds:
+        if term.kind == "compliance" and "prismatic" in self.pulls.kinds:
             raise ArgumentError(f"{term.name}: is that of an arm with turning joints alone")
         if term.kind in ("cos", "sin") and not term.of > 0:
             raise ArgumentError(f"{term.name}: the waves must be above 0")
         if term.kind == "coupling":
             if not 0 <= term.of < n or term.of == term.joint:
                 raise ArgumentError(f"{term.name}: the other joint must be another one of {n}")
-            if self.kinds[int(term.of)] != self.kinds[term.joint]:
+            if self.pulls.kinds[int(term.of)] != self.pulls.kinds[term.joint]:
                 raise ArgumentError(f"{term.name}: joints must both turn, or both slide")
 
     @cached_property
@@ -178,7 +171,12 @@ class JointLaws:
             return "rad/(N mm)"
         if term.kind == "coupling":
             return "1"
-        return "rad" if self.kinds[term.joint] == "revolute" else "mm"
+        return "rad" if self.pulls.kinds[term.joint] == "revolute" else "mm"
+
+    @cached_property
+    def yielding(self) -> bool:
+        """Whether a joint has a compliance."""
+        return any(term.kind == "compliance" for term in self.numbers)
 
     @cached_property
     def values(self) -> FloatArray:
@@ -196,7 +194,24 @@ class JointLaws:
 
     def approaching(self, approach: FloatArray) -> JointLaws:
         """With joints that come from there, (n,) or (N, n)."""
-        return replace(self, approach=approach, memo=Memo())
+        return replace(self, approach=approach)
+
+    def under(self, carried: AtTool | None) -> JointLaws:
+        """With what the tool carries, which compliances follow."""
+        return replace(self, pulls=self.pulls.under(carried))
+
+    def weighing(self, masses: FloatArray, centres: FloatArray) -> JointLaws:
+        """With masses (n,) and centres (n, 3) of the links."""
+        return replace(self, pulls=replace(self.pulls, masses=masses, centres=centres), memo=Memo())
+
+    def of_rows(self, rows: IntArray) -> JointLaws:
+        """With the state that it has in some rows of a call; itself where that is the same."""
+        approach, pulls = self.approach, self.pulls.of_rows(rows)
+        if approach is not None and approach.ndim == 2:
+            approach = approach[rows]
+        if approach is self.approach and pulls is self.pulls:
+            return self
+        return replace(self, pulls=pulls, approach=approach)
 
     # what joints add ------------------------------------------------------------------------------
 
@@ -208,24 +223,27 @@ class JointLaws:
 
     def basis(self, theta: FloatArray) -> FloatArray:
         """φ of each number, (N, k)."""
-        known = self.memo.of(theta)
+        carried = self.pulls.carried if self.yielding else None
+        key = theta, self.approach, *([] if carried is None else carried)
+        known = self.memo.of(*key)
         if known is None:
             known = self._basis(theta)
-            self.memo.keep(theta, known)
+            self.memo.keep(known, *key)
         return known
 
     def _basis(self, theta: FloatArray) -> FloatArray:
         found = np.zeros((len(theta), len(self.terms)))
-        products = self._products(theta) if self._pulled else None
+        at = self._posture(theta) if self._sagging or self.yielding else None
+        products = self.pulls.products(at) if self._sagging and at else None
+        torques = self.pulls.torques(at, theta) if self.yielding and at else None
         for c, (joint, kind, of) in enumerate(self.terms):
             match kind:
                 case "sag":
                     assert products is not None
                     found[:, c] = products[:, joint, int(of) // 3, int(of) % 3]
                 case "compliance":
-                    assert products is not None
-                    behind = products[:, joint, joint:], self._moments[joint:]
-                    found[:, c] = np.einsum("nle,le->n", *behind)
+                    assert torques is not None
+                    found[:, c] = torques[:, joint]
                 case "cos":
                     found[:, c] = np.cos(of * theta[:, joint])
                 case "sin":
@@ -247,90 +265,53 @@ class JointLaws:
                 found[:, joint, joint] += value * of * np.cos(of * theta[:, joint])
             elif kind == "coupling":
                 found[:, joint, int(of)] += value
-        if self._pulled:
-            found += self._turning(theta)
+        at = self._posture(theta) if self._sagging or self.yielding else None
+        if self._sagging and at:
+            found += self.pulls.products_turning(at, self._sags)
+        if self.yielding and at:
+            found += self._compliances[:, None] * self.pulls.torques_turning(at, theta)
         return found
 
     @property
     def _n(self) -> int:
-        return len(self.axes)
+        return len(self.pulls.axes)
 
     @cached_property
     def _joint(self) -> IntArray:
         return np.array([term.joint for term in self.terms], dtype=np.intp)
 
     @cached_property
-    def _pulled(self) -> bool:
-        """Whether gravity matters."""
-        return any(term.kind in ("sag", "compliance") for term in self.numbers)
+    def _sagging(self) -> bool:
+        """Whether products of gravity matter."""
+        return any(term.kind == "sag" for term in self.numbers)
 
     def _from(self, joint: int) -> FloatArray:
         assert self.approach is not None
         found: FloatArray = self.approach[..., joint]
         return found
 
-    @cached_property
-    def _direction(self) -> FloatArray:
-        found: FloatArray = np.array(self.gravity) / np.linalg.norm(self.gravity)
-        return found
-
-    @cached_property
-    def _moments(self) -> FloatArray:
-        """Moments of the links times gravity, (n, 3) N mm, as `weights.link_moments` has them."""
-        assert self.masses is not None and self.centres is not None
-        behind = self.masses.sum() - np.cumsum(self.masses)
-        found = self.masses[:, None] * (self.centres - self.points)
-        found[:-1] += behind[:-1, None] * (self.points[1:] - self.points[:-1])
-        moments: FloatArray = found * np.linalg.norm(self.gravity)
-        return moments
-
-    def _turned(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Rotations of the links (N, n, 3, 3), and axes of the joints (N, n, 3) as they stand."""
+    def _posture(self, theta: FloatArray) -> Posture:
         count, n = theta.shape
-        revolute = np.array([kind == "revolute" for kind in self.kinds])
+        revolute = np.array([kind == "revolute" for kind in self.pulls.kinds])
         twists = np.zeros((count, n, 6))
-        twists[..., :3] = (theta * revolute)[..., None] * self.axes
+        twists[..., :3] = (theta * revolute)[..., None] * self.pulls.axes
         turns = screws.exp(twists.reshape(-1, 6)).reshape(count, n, 4, 4)[..., :3, :3]
-        rotation = np.empty_like(turns)
-        before: FloatArray = np.broadcast_to(np.eye(3), (count, 3, 3))
-        for i in range(n):
-            before = before @ turns[:, i]
-            rotation[:, i] = before
-        return rotation, np.einsum("nijk,ik->nij", rotation, self.axes)
-
-    def _products(self, theta: FloatArray) -> FloatArray:
-        """Of joint i by link l, as `weights.gravity_products`, (N, n, n, 3).
-
-        Of the arm without joint errors; links before a joint are not left out.
-        """
-        rotation, axes = self._turned(theta)
-        across = np.cross(self._direction, axes)
-        found: FloatArray = np.einsum("nlkj,nik->nilj", rotation, across)
-        return found
+        return self.pulls.posture(turns)
 
     @cached_property
     def _sags(self) -> FloatArray:
-        """Moments of the links that turn each joint, (n, n, 3), times what they turn it."""
+        """What unit moments of the links turn each joint, (n, n, 3)."""
         found = np.zeros((self._n, self._n, 3))
         for (joint, kind, of), value in zip(self.terms, self.values.tolist(), strict=True):
             if kind == "sag":
                 found[joint, int(of) // 3, int(of) % 3] += value
-            elif kind == "compliance":
-                found[joint, joint:] += value * self._moments[joint:]
         return found
 
-    def _turning(self, theta: FloatArray) -> FloatArray:
-        """How sag changes with the commands, (N, n, n): moments and axes turn with joints."""
-        rotation, axes = self._turned(theta)
-        n, g = self._n, self._direction
-        revolute = np.array([kind == "revolute" for kind in self.kinds])
-        moments = np.einsum("nlab,ilb->nila", rotation, self._sags)
-        found = np.zeros((len(theta), n, n))
-        for j in np.flatnonzero(revolute).tolist():
-            z = axes[:, j, None]
-            behind = np.cross(z, moments[:, :, j:].sum(axis=2))  # links behind the joint turn
-            found[:, :, j] = (behind * np.cross(g, axes)).sum(axis=2)
-            carried = np.cross(z, axes[:, j + 1 :])  # so do the axes behind it
-            whole = moments[:, j + 1 :].sum(axis=2)
-            found[:, j + 1 :, j] += (whole * np.cross(g, carried)).sum(axis=2)
+    @cached_property
+    def _compliances(self) -> FloatArray:
+        """Of each joint (n,), rad/(N mm)."""
+        found = np.zeros(self._n)
+        for (joint, kind, _), value in zip(self.terms, self.values.tolist(), strict=True):
+            if kind == "compliance":
+                found[joint] = value
         return found

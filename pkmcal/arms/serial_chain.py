@@ -23,9 +23,10 @@ from pkmcal.arms.inputs import (
 )
 from pkmcal.arms.inverse import ArmInverse, Part, damped_least_squares
 from pkmcal.arms.joint_laws import JointLaws
-from pkmcal.arrays import FloatArray, Unit, as_rows
+from pkmcal.arrays import FloatArray, IntArray, Unit, as_rows
 from pkmcal.core.screws import Arm, Links
 from pkmcal.exceptions import ArgumentError
+from pkmcal.geometry.stated_uncertainty import StatedUncertainty, Uncertain, stated_uncertainty
 
 
 class SerialChain:
@@ -51,6 +52,7 @@ class SerialChain:
         joint_names: Sequence[str] | None = None,
         source: Source | None = None,
         laws: JointLaws | None = None,
+        uncertainty: Uncertain = None,
     ) -> None:
         self._name = instance("name", name, str)
         self._axes, self._points = axes_and_points(axes, points)
@@ -58,6 +60,7 @@ class SerialChain:
         self._joint_names = names_of(joint_names, len(self._axes))
         self._source = source
         self._laws = laws
+        self._uncertainty = stated_uncertainty(uncertainty)
         self._home = motion("home", home)
         prismatic = np.array([kind == "prismatic" for kind in self._kinds], dtype=np.int32)
         self.core = Arm(prismatic, joint_frames(self._axes), self._points, self._home)
@@ -92,6 +95,11 @@ class SerialChain:
     def laws(self) -> JointLaws | None:
         """What joints add to their commands: sag, gears; None where they add nothing."""
         return self._laws
+
+    @property
+    def uncertainty(self) -> StatedUncertainty:
+        """How wrong numbers may be that a calibration does not look for."""
+        return self._uncertainty
 
     @property
     def n_joints(self) -> int:
@@ -156,6 +164,7 @@ class SerialChain:
             "joint_names": self.joint_names,
             "source": self.source,
             "laws": self.laws,
+            "uncertainty": self.uncertainty.table(),
         }
 
     # kinematics ---------------------------------------------------------------------------------
@@ -310,6 +319,15 @@ class SerialChain:
             A wrong shape, no numbers, or no rigid motions.
         """
         return damped_least_squares(self, target, guess, joint_errors, parts)
+
+    def of_rows(self, rows: IntArray) -> SerialChain:
+        """The chain with joints in the state that they have in some rows of a call."""
+        laws = None if self._laws is None else self._laws.of_rows(rows)
+        if laws is self._laws:
+            return self
+        changed = self.arguments
+        changed["laws"] = laws
+        return SerialChain(**changed)
 
     # --------------------------------------------------------------------------------------------
 

@@ -49,6 +49,7 @@ def read(path: str | os.PathLike[str], tip: str | None, base: str | None) -> Arm
         "joint_names": tuple(joint.name for joint in joints),
         "source": Source(str(path), tip, base),
         "laws": None,
+        "uncertainty": None,
     }
 
 

@@ -13,7 +13,6 @@ from pkmcal.calibration.asked import (
     EARLIER,
     ErrorWord,
     Unknown,
-    effects_on,
     fixed_names,
     loss_and_rule,
     now,
@@ -34,13 +33,15 @@ from pkmcal.calibration.steps import (
 from pkmcal.diagnostics.row_errors import likely_mistakes
 from pkmcal.diagnostics.sag import sag_that_helps
 from pkmcal.effects.effect import Effects
+from pkmcal.effects.stated import effects_on
 from pkmcal.estimation.datasets import as_fit_data, by_set
 from pkmcal.estimation.free_parameters import parameters
 from pkmcal.estimation.held_coefficients import coefficients, of_the_machine, with_held
 from pkmcal.estimation.own_residuals import Residual, checked_residuals
 from pkmcal.estimation.parameters import Asked, Bounds, Prior
 from pkmcal.estimation.uncertain_numbers import uncertain_sets
-from pkmcal.exceptions import ArgumentError, CalibrationWarning
+from pkmcal.estimation.unused_entries import require_used
+from pkmcal.exceptions import ArgumentError, CalibrationWarning, FitError
 from pkmcal.fitted.dropped import Drop, left_out
 from pkmcal.geometry.stated_uncertainty import Uncertain, stated_uncertainty
 from pkmcal.kinematics.calibratable import as_machine
@@ -150,7 +151,9 @@ def identify(
         stand behind those of the robot file. Such numbers are fitted along, with this as a prior
         about their present values, and are in the result only if they moved by more than twice
         that: `Identification.nuisances`. ``target*``, ``frame*`` and the like mean what readings
-        depend on, ``scale`` the scale of the instrument (20e-6).
+        depend on, ``scale`` the scale of the instrument (20e-6). An entry all of whose numbers are
+        free, held or not there is refused, but in the robot file, which other calibrations read,
+        too.
 
         Under "common" are deviations of one amount by which all numbers are wrong alike, of points
         each coordinate: ``{"common": {"target*": 0.3}}``. Under "consider" are those of numbers of
@@ -199,13 +202,14 @@ def identify(
             partial(
                 identify, robot, measurements, free, prior=prior, loss=loss, unknown=unknown,
                 holdout=holdout, bounds=bounds, per_session=per_session,
-                fix=fix, drop=drop, residuals=residuals,
+                fix=fix, drop=drop, uncertainty=uncertainty, residuals=residuals,
             )
         )  # fmt: skip
     machine = as_machine(robot)
     roles, own = unknown_roles(unknown), words("per_session", per_session)
     fixed, find_datum = fixed_names(fix)
-    stated = machine.model.uncertainty.with_later(stated_uncertainty(uncertainty))
+    named = stated_uncertainty(uncertainty)
+    stated = machine.model.uncertainty.with_later(named)
     machine, moving, of_effects = effects_on(machine, effects)
     weighed, rule = loss_and_rule(loss)
     given = as_fit_data(machine, measurements, roles, bool(own), moving)
@@ -219,9 +223,10 @@ def identify(
         of_effects=of_effects, uncertainty=stated, uncertain_roles=uncertain,
         residuals=checked_residuals(residuals),
     )  # fmt: skip
-    named, drop_outliers, drop_slack = left_out(drop, sum(len(data.rows) for data in given))
-    rows = prepare(machine, given, holdout, named, bool(own))
+    dropped, drop_outliers, drop_slack = left_out(drop, sum(len(data.rows) for data in given))
+    rows = prepare(machine, given, holdout, dropped, bool(own))
     chosen = parameters(machine, rows.fitted, asked)
+    require_used(named, chosen)
     problem = begin(rows, chosen)
     try:
         if drop_outliers:
@@ -231,7 +236,7 @@ def identify(
         fit = solve(problem, weighed, rule)
         if find_datum:
             fit = with_datum(fit, rows, asked)
-    except ValueError as error:
+    except FitError as error:
         hint = likely_mistakes(rows.fitted, chosen, problem.start)
         if not hint and not problem.start.ok:
             hint = ["check units, signs and columns of their actuators, or leave these rows out"]
@@ -250,7 +255,7 @@ def _automatic(identified: Callable[..., Identification[Given]]) -> Identificati
         warnings.simplefilter("ignore", CalibrationWarning)
         found = identified(effects=())
     helps = sag_that_helps(found.fit)
-    if helps is not None and helps.effect is not None:
+    if helps is not None:
         return identified(effects=[helps.effect])
     for text in found.warnings:
         warnings.warn(text, CalibrationWarning, stacklevel=4)  # of who called, beyond the adapter

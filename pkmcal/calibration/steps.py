@@ -154,7 +154,10 @@ def without_slack(problem: Problem) -> Problem:
 def solve(problem: Problem, loss: LossName, rule: CovarianceRule) -> Fit:
     """Search from the start of the problem; an error where rows are not reached."""
     estimator = estimator_at(problem.equations, problem.exact, problem.start, loss)
-    return Fit(problem, estimator, solved_in_least_minima(estimator), rule=rule)
+    estimate = solved_in_least_minima(estimator)
+    if failed := problem.equations.failures(estimate.evaluation):
+        raise ArgumentError(f"{failed} where the search ended")
+    return Fit(problem, estimator, estimate, rule=rule)
 
 
 def with_datum(fit: Fit, rows: Rows, asked: Asked) -> Fit:

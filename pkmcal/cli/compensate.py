@@ -16,7 +16,14 @@ import pkmcal as pk
 from pkmcal.arguments import word
 from pkmcal.arrays import FloatArray
 from pkmcal.cli.inputs import Inputs
-from pkmcal.cli.load_options import Payload, PayloadAt, ToolForce, carrying
+from pkmcal.cli.load_options import (
+    Payload,
+    PayloadAt,
+    ToolForce,
+    ToolLoads,
+    carrying,
+    loads_by_tool,
+)
 from pkmcal.cli.options import Force, Json, ParallelRobot, Seed
 from pkmcal.cli.output import Output, say
 from pkmcal.cli.rows import POSE_UNITS, numbers_on_line
@@ -106,6 +113,7 @@ def compensate(
     payload: Payload = None,
     payload_at: PayloadAt = None,
     tool_force: ToolForce = None,
+    load: ToolLoads = None,
     force: Force = False,
     json: Json = False,
 ) -> int:
@@ -143,10 +151,11 @@ def compensate(
             joints=joints,
             start=_start(start),
             passed=passed or (),
+            loads=loads_by_tool(load),
         )
         return _program(desired, Output(out, [desired.name], read, force), json, correct)
     of_programs = {"chord": chord, "joints": joints, "start": start}
-    _refuse(of_programs | {"firmware": firmware, "pass": passed}, "a table of poses")
+    _refuse(of_programs | {"firmware": firmware, "pass": passed, "load": load}, "a table of poses")
     machine = carrying(machine, payload, payload_at, tool_force)
     poses = read_poses(read.file(desired), machine)
     reached = read_reached(read.file(measured))

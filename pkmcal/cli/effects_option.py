@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, Literal
 
-from pkmcal.arguments import did_you_mean
+from pkmcal.arguments import word as checked_word
 from pkmcal.effects.elasticity import Elasticity
 from pkmcal.effects.gears import Backlash, Coupling, Harmonics
 from pkmcal.effects.sag import Sag
@@ -46,10 +46,7 @@ def read_effects(given: Sequence[str]) -> list[Any] | Literal["auto"]:
 def _effect(word: str) -> Any:
     name, _, of = word.partition("=")
     if name not in _READ:
-        known = (*_READ, AUTO, "none")
-        raise ArgumentError(
-            f"{OPTION} {word}: expected one of {', '.join(known)}{did_you_mean(name, known)}"
-        )
+        checked_word(OPTION, name, (*_READ, AUTO, "none"))
     try:
         return _READ[name](of)
     except ValueError:

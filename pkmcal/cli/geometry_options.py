@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from fnmatch import fnmatchcase
 
-from pkmcal.core.library import POSE
 from pkmcal.estimation.prior_functions import terms
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.units import UNITS
-from pkmcal.geometry.stated_uncertainty import COMMON, CONSIDER
+from pkmcal.geometry.stated_uncertainty import COMMON, CONSIDER, unit_of
 from pkmcal.kinematics.calibratable import Calibratable
 
-_FRAME = dict(zip(POSE, ("mm", "mm", "mm", "rad", "rad", "rad"), strict=True))
 _PAIR = re.compile(r"(?P<name>[^=]+)=\s*(?P<value>[^=±]*?)\s*(?:±|\+-)\s*(?P<sigma>.*)")
 _DEVIATION = re.compile(
     r"(?:(?P<name>[^=]+)=)?\s*"
@@ -195,16 +192,7 @@ def _deviation(text: str, robot: Calibratable, names: Sequence[str]) -> tuple[st
 def _unit_of(pattern: str, robot: Calibratable, names: Sequence[str]) -> str:
     """Unit of the numbers that a pattern covers; what is not known is a length."""
     units = dict(zip(robot.geometry.names, robot.geometry.units, strict=True))
-    known = {name: str(units[name]) for name in names}
-    known |= {f"frame.{name}": unit for name, unit in _FRAME.items()}
-    number = pattern.partition("@")[0]  # of whatever session
-    covered = {known[name] for name in known if fnmatchcase(name, number)}
-    if len(covered) > 1:
-        raise ArgumentError(
-            "covers lengths, angles or ratios together; name them apart, or give one number"
-            " without a name"
-        )
-    return covered.pop() if covered else "mm"
+    return unit_of(pattern, {name: str(units[name]) for name in names})
 
 
 def _in_unit(number: float, unit: str, quantity: str, name: str) -> float:

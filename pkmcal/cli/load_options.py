@@ -15,6 +15,7 @@ from pkmcal.kinematics.robot import Robot
 
 _MASSES = {"": 1.0, "kg": 1.0, "g": 1e-3, "t": 1e3, "lb": 0.45359237}  # kg
 _MASS = re.compile(r"(.*?)\s*([a-z]*)")
+_TOOL = re.compile(r"[Tt]?(\d+)\s*=([^,]*)(?:,(.*))?", re.ASCII)
 
 Payload = Annotated[
     str | None,
@@ -30,6 +31,15 @@ PayloadAt = Annotated[
 ToolForce = Annotated[
     str | None,
     typer.Option(metavar="X,Y,Z", help="What pulls at the tool, N, in the axes of the base."),
+]
+ToolLoads = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--load",
+        metavar="TOOL=MASS",
+        help="Of a program, what the machine carries with a tool: 'T1=0.8kg', or with its centre"
+        " of mass in the frame of the tool 'T1=0.8kg,0,0,40'.",
+    ),
 ]
 Yielding = Annotated[
     list[str] | None,
@@ -50,10 +60,24 @@ def carrying(
         raise ArgumentError("--payload-at is the centre of a payload: --payload is missing")
     load = Load(
         0.0 if payload is None else mass("--payload", payload),
-        _three("--payload-at", payload_at),
-        _three("--tool-force", tool_force),
+        three("--payload-at", payload_at),
+        three("--tool-force", tool_force),
     )
     return robot.carrying(load)
+
+
+def loads_by_tool(texts: list[str] | None) -> dict[int, Load]:
+    """What the machine carries with each tool."""
+    found: dict[int, Load] = {}
+    for text in texts or ():
+        match = _TOOL.fullmatch(text.strip())
+        if match is None:
+            raise ArgumentError(f"--load must be T1=MASS or T1=MASS,X,Y,Z, found {text!r}")
+        tool = int(match[1])
+        if tool in found:
+            raise ArgumentError(f"--load states T{tool} twice")
+        found[tool] = Load(mass("--load", match[2]), three("--load", match[3]))
+    return found
 
 
 def yielding(robot: Robot, compliances: list[str] | None) -> Robot:
@@ -82,7 +106,8 @@ def mass(option: str, text: str) -> float:
         raise ArgumentError(f"{option} must be a mass in {units}, found {text!r}") from None
 
 
-def _three(option: str, text: str | None) -> tuple[float, float, float]:
+def three(option: str, text: str | None) -> tuple[float, float, float]:
+    """Three numbers of an option; zeros without it."""
     if text is None:
         return (0.0, 0.0, 0.0)
     row = numbers_on_line(option, text, ("mm", "mm", "mm"), rad=True)

@@ -79,10 +79,12 @@ _CHAINS = """\
 # [[tail]]         below the limbs: a joint behind the platform; kind R or P, at, axis, actuator
 """
 _ARM = """\
-# units      of every number below; mm, m or in; deg or rad
-# [tool]     home: pose of the tool with all joints at zero
-# [[joint]]  one for each, from the base: kind, axis and a point on it with all joints at zero;
-#            error (optional): dx dy dz dphi dtheta dpsi, what a calibration finds
+# units         of every number below; mm, m or in; deg or rad
+# [tool]        home: pose of the tool with all joints at zero
+# [uncertainty] how wrong numbers may be that are not found, one standard deviation:
+#               `"joint1.d?" = 0.05`, `"target*" = 0.1`; common = { "target*" = 0.1 }: all alike
+# [[joint]]     one for each, from the base: kind, axis and a point on it with all joints at zero;
+#               error (optional): dx dy dz dphi dtheta dpsi, what a calibration finds
 """
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Annotated, Any
@@ -12,6 +13,7 @@ import typer
 from pkmcal.arguments import did_you_mean, word
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray
+from pkmcal.cli.effects_option import AUTO, OPTION, read_effects
 from pkmcal.cli.geometry_options import free_names, read_prior
 from pkmcal.cli.inputs import Inputs
 from pkmcal.cli.load_options import Yielding, mass, yielding
@@ -106,6 +108,14 @@ def plan(
             " default.",
         ),
     ] = None,
+    effects: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="WORDS",
+            help="What the calibration is to find as well, as pkmcal calibrate has it:"
+            " elasticity=offset*, sag.",
+        ),
+    ] = None,
     compliance: Yielding = None,
     free: Free = None,
     prior: Prior = None,
@@ -171,6 +181,7 @@ def plan(
             payloads=[]
             if payloads is None
             else [mass("--payloads", m) for m in payloads.split(",")],
+            effects=_effects(effects or ["none"]),
             free=chosen or None,
             prior=read_prior(prior or [], seen, chosen),
             unknown=[word("--unknown", each, UNKNOWN) for each in unknown or ()],
@@ -316,3 +327,11 @@ def _write(made: Plan, out: Path, head: str) -> None:
             | {name: np.repeat(kg[own], len(points)) for name, kg in carried.items()},
             comment=head,
         )
+
+
+def _effects(given: Sequence[str]) -> list[Any]:
+    """The effects that the calibration is to find as well."""
+    read = read_effects(given)
+    if isinstance(read, str):
+        raise ArgumentError(f"{OPTION}: {AUTO} is decided by rows, which a plan has not yet")
+    return read

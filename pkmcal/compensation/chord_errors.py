@@ -70,13 +70,14 @@ class ChordErrors:
         ways = np.array([move.target for move in moves]) - starts
         which = np.repeat(np.arange(len(parts)), parts)
         first = counted(parts)
+        carried = np.array([move.carried for move in moves], dtype=np.intp)[which]
 
         def at(share: FloatArray) -> FloatArray:
             found: FloatArray = starts[which] + share[:, None] * ways[which]
             return found
 
         ends = [at((first + k) / parts[which]) for k in (0, 1)]
-        commands = [machine.command(end) for end in ends]
+        commands = [machine.command(end, carried) for end in ends]
         for found in commands:
             self._require(moves, which, found)
         begin, end = machine.continuous(np.stack(commands, axis=1)).swapaxes(0, 1)
@@ -85,7 +86,9 @@ class ChordErrors:
         shares = np.concatenate([np.repeat(_INSIDE, len(which)), shares])
         of = which[rows]
         meant = starts[of] + ((first[rows] + shares) / parts[of])[:, None] * ways[of]
-        reached = machine.reached(begin[rows] + shares[:, None] * (end - begin)[rows], meant)
+        reached = machine.reached(
+            begin[rows] + shares[:, None] * (end - begin)[rows], meant, carried[rows]
+        )
         off = machine.distance(reached, meant)
         self._require(moves, of, off[:, None])
         worst = np.zeros(len(parts))

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray, wrapped
 from pkmcal.core.library import POSE
+from pkmcal.geometry.carried import Load
 from pkmcal.kinematics.complete import written_as
 from pkmcal.kinematics.robot import Robot, determines_others
 
@@ -14,9 +17,23 @@ _ONTO_NODE = 2  # steps by the secant, which is good: segments are short
 
 
 class CommandedMachine:
-    """Commands of the controller for coordinates (N, axes) in mm and deg, and where they lead."""
+    """Commands of the controller for coordinates (N, axes) in mm and deg, and where they lead.
 
-    def __init__(self, controller: Robot, calibrated: Robot, joints: bool) -> None:
+    Parameters
+    ----------
+    controller, calibrated : Robot
+        The machine as the controller computes it, and as it is.
+    joints : bool
+        Whether commands are actuator coordinates.
+    loads : sequence of Load
+        What the calibrated machine carries in turn: the calls say by `carried` (N,) which of them.
+        Without any it carries what its file states.
+    """
+
+    def __init__(
+        self, controller: Robot, calibrated: Robot, joints: bool, loads: Sequence[Load] = ()
+    ) -> None:
+        self._loads = np.array([load.rows(()) for load in loads])
         self.axes = controller.moved
         self.letters = "".join(_LETTERS[axis] for axis in self.axes)
         self.joints = joints
@@ -53,13 +70,16 @@ class CommandedMachine:
         poses[:, self._places] = np.where(self._turns, np.radians(coordinates), coordinates)
         return poses
 
-    def command(self, coordinates: FloatArray) -> FloatArray:
+    def _load(self, carried: IntArray) -> Load | None:
+        return Load.of_rows(self._loads[carried]) if len(self._loads) else None
+
+    def command(self, coordinates: FloatArray, carried: IntArray) -> FloatArray:
         """What to write so that the calibrated machine goes there; NaN where it cannot.
 
         Angles are in the turn of the coordinates; those of actuators in any.
         """
         poses = self._poses(coordinates, self._calibrated)
-        q = self._calibrated.inverse(poses, match=self._match)
+        q = self._calibrated.inverse(poses, match=self._match, load=self._load(carried))
         if self.joints:
             found: FloatArray = q * self._degrees
             return found
@@ -84,10 +104,11 @@ class CommandedMachine:
             found = q * self._degrees
         return found
 
-    def reached(self, command: FloatArray, near: FloatArray) -> FloatArray:
+    def reached(self, command: FloatArray, near: FloatArray, carried: IntArray) -> FloatArray:
         """Where the calibrated machine goes on a command."""
         poses = self._poses(near, self._calibrated)
-        solved = self._calibrated.forward(self._readings(command), guess=poses)
+        q = self._readings(command)
+        solved = self._calibrated.forward(q, guess=poses, load=self._load(carried))
         return self._near(solved.pose, near)
 
     def _readings(self, command: FloatArray) -> FloatArray:

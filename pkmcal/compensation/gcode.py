@@ -7,17 +7,18 @@ refused with its line: readers of G-code that are published lose one or the othe
 from __future__ import annotations
 
 import io
-from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 
 from pkmcal.arrays import FloatArray
 from pkmcal.compensation.gcode_dialect import AXES, NEVER_PASSED, Dialect, Meaning
 from pkmcal.compensation.gcode_line import Command, Unclear, Word, commands
 from pkmcal.compensation.gcode_move import NO_FEED, Extrusion, Feed, Move
+from pkmcal.compensation.gcode_tools import Carried, Tools
 from pkmcal.exceptions import ArgumentError, FileError
 from pkmcal.files.text_lines import MARK
 
-_HOMING = "homing"  # what messages call it
+_HOMING, _TOOL = "homing", "a change of tool"  # what messages call them
 _INCH = 25.4
 
 
@@ -37,6 +38,8 @@ class _State:
         M83; whether the last of G90, G91, M82 and M83 was G91 or M83.
     timed : bool
         Whether moves state their times.
+    carried : Carried
+        The tool.
     """
 
     at: tuple[float, ...]
@@ -52,6 +55,7 @@ class _State:
     own: bool | None = None
     last: bool | None = None
     timed: bool = False
+    carried: Carried = field(default_factory=Carried)
 
 
 class Program:
@@ -76,6 +80,8 @@ class Program:
         do not what they are refused for.
     times : bool
         Whether moves are to state their times: G94 becomes G93.
+    tools : mapping of int to int, optional
+        Which load each tool is; its changes are followed where there are any.
 
     Attributes
     ----------
@@ -100,6 +106,7 @@ class Program:
         stated: bool,
         passed: Collection[str] = (),
         times: bool = False,
+        tools: Mapping[int, int] | None = None,
     ) -> None:
         self.left: dict[str, int] = {}
         self.dialect = dialect
@@ -108,6 +115,7 @@ class Program:
         self._start = tuple(map(float, start))
         self._passed = frozenset(name.upper() for name in passed)
         self._times = times
+        self._tools = Tools(dialect, tools or {})
         for name in sorted(self._passed):
             if dialect.words.get(name) in NEVER_PASSED:
                 raise ArgumentError(
@@ -136,6 +144,8 @@ class Program:
         for i, line in enumerate(lines):
             if line.endswith("\r") and self.dialect.newlines:
                 raise self.wrong(i, f"{self.dialect.title} ends no line at a carriage return alone")
+            if "\0" in line:
+                raise self.wrong(i, "has a zero byte, at which controllers end a line: no text")
             code = line.rstrip("\r\n")
             code = code.replace(MARK, " ", 1) if i == 0 else code
             marked = code.strip() == "%" if marked is None and code.strip() else marked
@@ -167,8 +177,11 @@ class Program:
         if self.dialect.block:
             self._require_feed_of_units(found, state)
         macro = ""
-        for command in found:
+        for command in self._tools.in_order(found):
             meaning = self._meaning(command)
+            changes = self._tools.changes(command, state.carried)
+            if changes:
+                meaning = Meaning.MOVES
             if macro and meaning is not Meaning.HARMLESS:
                 raise Unclear(
                     f"behind {macro}, {command.shown} may not be executed: break the line"
@@ -180,7 +193,7 @@ class Program:
             elif meaning is Meaning.MOVES:
                 self.left.setdefault(command.shown.upper(), i)
                 state.known, state.fresh, state.extruded = set(), True, None
-                state.lost_by = command.shown.upper()
+                state.lost_by = _TOOL if changes else command.shown.upper()
             elif meaning is Meaning.FOLLOWED and command.name in ("", "G0", "G1"):
                 moves += self._move(i, command, state)
             elif meaning is Meaning.FOLLOWED:
@@ -272,6 +285,8 @@ class Program:
             state.feed = Feed(feed.value * state.scale, feed.value)
         extrusion = self._extrusion(words.get("E"), state)
         if not axes:
+            if state.timed and command.name == "G1" and feed is None:
+                raise Unclear("as a joint move, G1 needs axis words or F: take it out")
             return []
         start, known = state.at, state.known.issuperset(self._letters)
         fresh = self._fresh(state)
@@ -297,6 +312,7 @@ class Program:
                 begins_times=begins_times,
                 behind=command.behind,
                 repeated=self._repeated(words),
+                carried=state.carried.load,
             )
         ]
 
@@ -340,7 +356,7 @@ class Program:
         where = f"where {' and '.join(unknown)} is, is not known here"
         if state.lost_by:
             passed = f"; if it moves nothing and changes no mode: --pass {state.lost_by}"
-            unless = "" if {state.lost_by} & {_HOMING, *self._passed} else passed
+            unless = "" if {state.lost_by} & {_HOMING, _TOOL, *self._passed} else passed
             raise Unclear(f"{where}, behind {state.lost_by}: name all axes{unless}")
         raise Unclear(
             f"{where}: state the pose at the start, or let the first move name X, Y and Z"

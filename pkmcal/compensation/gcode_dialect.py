@@ -88,6 +88,10 @@ class Dialect:
         Whether a G0 goes along a line with its feed, as a G1 does.
     repeated : frozenset of str
         Words of a move that each of its parts has to state.
+    takes : str
+        The word that takes the tool that T selects; empty where T itself does.
+    takes_unseen : frozenset of str
+        Words that may change the tool in another way.
     """
 
     title: str
@@ -109,6 +113,8 @@ class Dialect:
     inverse_time: bool = False
     rapid_lines: bool = False
     repeated: frozenset[str] = frozenset()
+    takes: str = ""
+    takes_unseen: frozenset[str] = frozenset()
 
     def name(self, letter: str, number: str) -> str:
         """A word as its table has it."""

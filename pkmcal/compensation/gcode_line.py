@@ -26,6 +26,7 @@ _EXPONENT = _ascii(r"[\d.][Ee][-+]?[\d.]")
 _CHECKSUM = _ascii(r".*\*[ \t]*\d+[ \t]*")
 _TEXT = _ascii(r'"[^"]*"?|\{[^{}]*\}')
 _NEXT = _ascii(r"[GgMm]")
+_LOWER = _ascii(r"'[GgMm]")
 _PASSED_OVER = _ascii(r"(?<![A-Za-z_=])[GgMm](?=[ \t]*\d)")
 _LETTER = _ascii(r"(?<![A-Za-z_=])[A-Za-z](?![A-Za-z_])")
 _PROGRAM_NUMBER = _ascii(r"[ \t]*[Oo][ \t]*\d+[ \t]*")
@@ -180,6 +181,8 @@ def _command(code: str, dialect: Dialect) -> tuple[Command, int]:
         return Command(name, shown), len(code)
     if '"' in rest or "{" in rest:
         rest = _TEXT.sub(lambda found: "_" * len(found[0]), rest)
+    if dialect.several and letter and _LOWER.search(rest):
+        raise Unclear("a G or M behind ' begins a command in some versions and not in others")
     following = None if macro else (_NEXT if dialect.several else _PASSED_OVER).search(rest)
     if following is not None:
         rest = rest[: following.start()]

@@ -71,6 +71,8 @@ class Move:
         What acts behind it in its line.
     repeated : str
         Words that each of its parts has to state.
+    carried : int
+        Which of the loads of the program's tools the machine carries.
     """
 
     line: int
@@ -90,3 +92,4 @@ class Move:
     begins_times: bool
     behind: str
     repeated: str
+    carried: int

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from typing import Literal, get_args
@@ -10,7 +10,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pkmcal.arguments import flag, instance, word, words
+from pkmcal.arguments import flag, instance, whole, word, words
 from pkmcal.arguments import number as as_number
 from pkmcal.arguments import path as as_path
 from pkmcal.arrays import as_rows
@@ -25,6 +25,7 @@ from pkmcal.compensation.words_of_reprap import REPRAP
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.atomic import write_pieces
 from pkmcal.files.reading import MOST_TEXT, content
+from pkmcal.geometry.carried import Load
 from pkmcal.kinematics.robot import Robot, require_parallel
 from pkmcal.result import Result
 
@@ -90,6 +91,7 @@ def compensate_program(
     joints: bool = False,
     start: ArrayLike | None = None,
     passed: Sequence[str] = (),
+    loads: Mapping[int, Load] | None = None,
     out: str | PathLike[str] | None = None,
 ) -> CorrectedProgram:
     r"""Correct a program in plain G-code for a controller that has other numbers than the machine.
@@ -121,6 +123,10 @@ def compensate_program(
         Macros and other words, such as ``"PARK"``, that move nothing and change no mode; or
         refused words, such as ``"M420"``, that here do not what they are refused for: the next move
         behind each names all axes.
+    loads : mapping of int to Load, optional
+        What a calibrated machine that yields carries with each tool, by the number behind T, in
+        place of the payload that its file states and that it carries before the first change of
+        tool. Behind each change the next move names all axes. A macro is taken to change no tool.
     out : str or path, optional
         Where to write the program, piece by piece, in place of `text`; it is there as a whole or
         not at all.
@@ -166,10 +172,11 @@ def compensate_program(
     place = as_path("path", path)
     if flag("joints", joints) and not dialect.inverse_time:
         raise ArgumentError(f"joints: {dialect.title} has no inverse time feed, G93")
+    carried = _loads(calibrated, loads)
     begin, shape = as_rows("start", controller.home if start is None else start, 6)
     if shape != ():
         raise ArgumentError(f"start must have shape (6,), found {(*shape, 6)}")
-    machine = CommandedMachine(controller, calibrated, joints)
+    machine = CommandedMachine(controller, calibrated, joints, list(carried.values()))
     program = Program(
         content(path, MOST_TEXT),
         str(place),
@@ -179,6 +186,7 @@ def compensate_program(
         stated=start is not None,
         passed=words("passed", passed),
         times=joints,
+        tools={tool: k for k, tool in enumerate(carried) if tool is not None},
     )
     pieces = Pieces(program, machine, chord)
     if out is None:
@@ -190,3 +198,16 @@ def compensate_program(
     return CorrectedProgram(
         text, pieces.moves, pieces.segments, pieces.correction, pieces.chord_error, left
     )
+
+
+def _loads(robot: Robot, loads: Mapping[int, Load] | None) -> dict[int | None, Load]:
+    """The loads of a program's tools, behind what is carried before; none where none is stated."""
+    if not loads:
+        return {}
+    found: dict[int | None, Load] = {None: Load.stated(dict(robot.geometry.items()))}
+    for tool, load in loads.items():
+        whole("loads: the number of a tool", tool, 0)
+        robot.under(instance(f"loads: that of tool {tool}", load, Load))  # refuses
+        load.rows(())
+        found[tool] = load
+    return found

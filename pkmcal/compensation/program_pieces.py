@@ -79,7 +79,8 @@ class Pieces:
 
     def _commands(self, moves: Sequence[Move], which: IntArray, points: FloatArray) -> FloatArray:
         """What to write for points, going on from the command before."""
-        commands = self._machine.command(points)
+        carried = np.array([move.carried for move in moves], dtype=np.intp)
+        commands = self._machine.command(points, carried[which])
         unreached = which[~np.isfinite(commands).all(axis=1)]
         if len(unreached):
             raise self._errors.unreached(moves[int(unreached[0])])

@@ -14,6 +14,7 @@ KLIPPER = Dialect(
     newlines=True,
     texts=frozenset({"M23", "M28", "M32", "M117", "M118", "ECHO", "RESPOND", "SET_DISPLAY_TEXT"}),
     rapid_lines=True,
+    takes_unseen=frozenset({"ACTIVATE_EXTRUDER"}),
     words=table(
         followed="G0 G1 G21 G90 G91 G92 M82 M83",
         harmless="""

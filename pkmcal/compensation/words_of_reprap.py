@@ -4,7 +4,7 @@ A line may have several commands; behind one that runs a macro others are execut
 and not by others. M82 and M83 alone say whether E is relative; what is extruded relatively counts
 in later absolute numbers in some versions and not in others. A number that it has not, and so is
 not here, runs a macro of that name. M109 selects a tool if none is, and M291 with axes lets them be
-moved by hand.
+moved by hand. It passes over carriage returns.
 """
 
 from pkmcal.compensation.gcode_dialect import AXES, OFFSETS, Dialect, Meaning, table
@@ -13,12 +13,14 @@ from pkmcal.compensation.words_of_printers import PRINTERS
 REPRAP = Dialect(
     title="RepRapFirmware",
     several=True,
+    newlines=True,
     letters=frozenset("EF"),
     extrusion=("M82 M83",),
     adds_relative=False,
     texts=frozenset({"M117"}),
     remark=r'"[^"]*"?|;.*',
     rapid_lines=True,
+    takes_unseen=frozenset({"M109"}),
     by_letters={"G10": OFFSETS, "M291": (AXES, Meaning.MOVES)},
     words=table(
         PRINTERS,

@@ -64,7 +64,7 @@ def breakeven(fit: Fit) -> tuple[Breakeven, ...]:
     held = held_numbers(sure, fit.end, StatedUncertainty(dict.fromkeys(names, 1.0)))
     if held is None:
         return ()
-    follow = sure.fit.back @ (sure.fit.design.T @ held.columns)  # scaled, by each number
+    follow = sum(sure.fit.back @ (sure.fit.design[rows].T @ some) for rows, some in held.columns())
     total = float(np.trace(sure.scaled))
     found = []
     for unit in _KINDS:

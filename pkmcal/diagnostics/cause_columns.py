@@ -9,11 +9,18 @@ from typing import NamedTuple
 import numpy as np
 
 from pkmcal import screw
-from pkmcal.arrays import BoolArray, FloatArray, IntArray
+from pkmcal.arrays import BoolArray, FloatArray, IntArray, lots
+from pkmcal.diagnostics.columns import of_poses, of_rows
+from pkmcal.effects.gears import Coupling, Harmonics
 from pkmcal.estimation.evaluation import Evaluation
+from pkmcal.exceptions import ArgumentError
 from pkmcal.fitted.fit import Fit
 from pkmcal.fitted.held_numbers import held_numbers
+from pkmcal.fitted.left_out import effect_columns
 from pkmcal.geometry.stated_uncertainty import SCALE, StatedUncertainty
+from pkmcal.kinematics.calibratable import ArmMachine
+from pkmcal.readings.reading import Predicted
+from pkmcal.statistics.score_test import Columns
 
 _LEAST_TRAVEL = 0.02  # of the machine's length, from which a place is more than an error
 _LEAST_WAY = 1e-9  # of the machine's length, below which actuators have not moved
@@ -28,52 +35,54 @@ class Cause(NamedTuple):
         As messages say it.
     cure : str
         What helps.
-    columns : callable (fit) -> ndarray (M, d) or None
-        Its columns, whitened; None where it cannot be.
+    columns : callable (fit) -> Columns or None
+        Its columns; None where it cannot be.
     """
 
     name: str
     cure: str
-    columns: Callable[[Fit], FloatArray | None]
+    columns: Callable[[Fit], Columns | None]
 
 
-def _moved(fit: Fit, twists: FloatArray) -> FloatArray:
-    """Whitened readings (M, d) of a platform that moves by twists (K, 6, d) of its poses."""
-    equations, sure = fit.equations, fit.uncertainty
-    table, parts = equations.table, []
-    for i, seen in enumerate(equations.prediction.predicted(fit.end)):
-        part = seen.by_twist @ twists[table.pose_of[i]]
-        other = table.other_of[i]
-        if seen.by_other is not None and other is not None:
-            part = part + seen.by_other @ twists[other]
-        parts.append(part)
-    return sure.equations.whitening.whitened(parts, sure.factors)
+def _by_actuators(fit: Fit, poses: IntArray) -> FloatArray:
+    """Twists (b, 6, n) of the platform by its actuators."""
+    return fit.end.machines.actuator_twists(fit.end.states, poses)
 
 
-def _by_actuators(fit: Fit) -> FloatArray:
-    """Twists (K, 6, n) of the platform by its actuators."""
-    return fit.end.machines.actuator_twists(fit.end.states)
+def _by_all_actuators(fit: Fit, factors: FloatArray) -> Columns:
+    """Columns of actuators that all become longer, by factors (K, d) of each pose."""
+    return of_poses(
+        fit,
+        lambda poses: (
+            _by_actuators(fit, poses).sum(axis=2, keepdims=True) * factors[poses][:, None, :]
+        ),
+    )
+
+
+def _by_each_actuator(fit: Fit, factors: FloatArray) -> Columns:
+    """Columns of each actuator that becomes longer, by factors (K, n) of each pose."""
+    return of_poses(fit, lambda poses: _by_actuators(fit, poses) * factors[poses][:, None, :])
 
 
 def _before(fit: Fit) -> IntArray:
-    """The pose from which the machine came to each, in the order of measuring; itself at first."""
+    """The pose from which the machine came to each, in the order of measuring; itself at first.
+
+    Of a pose where it was several times, at the last of them.
+    """
     equations = fit.equations
     before = np.arange(len(fit.end.pose))
     for i, data in enumerate(equations.prediction.datasets):
-        m, pose = data.measured, equations.table.pose_of[i]
+        m = data.measured
         time = np.arange(len(m)) if m.time is None else m.time
         session = (
             np.zeros(len(m)) if m.session is None else np.unique(m.session, return_inverse=True)[1]
         )
         order = np.lexsort((time, session))
-        last, current, own = -1, -1, -1.0
-        for row in order.tolist():
-            if session[row] != own:
-                last, current, own = -1, -1, session[row]
-            if pose[row] != current:
-                last, current = current, int(pose[row])
-            if last >= 0:
-                before[current] = last
+        pose, session = equations.table.pose_of[i][order], session[order]
+        new = (np.diff(pose, prepend=-1) != 0) | (np.diff(session, prepend=-1) != 0)
+        pose, session = pose[new], session[new]
+        came = np.flatnonzero(np.diff(session) == 0)
+        before[pose[came + 1]] = pose[came]
     return before
 
 
@@ -86,26 +95,28 @@ def _travelled(fit: Fit, ways: FloatArray) -> BoolArray:
     return travelled
 
 
-def _lag(fit: Fit) -> FloatArray | None:
+def _lag(fit: Fit) -> Columns:
     """The platform was still on its way: a part of the way back to the pose before."""
-    before, motions = _before(fit), screw.from_pose(fit.end.pose)
-    back = motions[before] @ np.linalg.inv(motions)
-    turn = screw.log(back)[:, :3]
-    way = fit.end.pose[before, :3] - fit.end.pose[:, :3]
-    twist = np.concatenate([turn, way], axis=1)
+    before, pose = _before(fit), fit.end.pose
+    twist = np.empty((len(pose), 6))
+    for own in lots(len(pose)):
+        back = screw.from_pose(pose[before[own]]) @ np.linalg.inv(screw.from_pose(pose[own]))
+        twist[own, :3] = screw.log(back)[:, :3]
+        twist[own, 3:] = pose[before[own], :3] - pose[own, :3]
     arcs = twist * np.repeat([fit.end.robot.length, 1.0], 3)
-    return _moved(fit, np.where(_travelled(fit, arcs), twist, 0.0)[:, :, None])
+    twist = np.where(_travelled(fit, arcs), twist, 0.0)
+    return of_poses(fit, lambda poses: twist[poses][:, :, None])
 
 
-def _play(fit: Fit) -> FloatArray | None:
+def _play(fit: Fit) -> Columns:
     """Each actuator stops short of where it was to go, by the direction it came from."""
     q = fit.end.actuators
     way = q - q[_before(fit)]
-    sign = np.sign(np.where(np.abs(way) > _LEAST_WAY * fit.end.robot.length, way, 0.0))
-    return _moved(fit, _by_actuators(fit) * sign[:, None, :])
+    least = _LEAST_WAY * fit.end.robot.length
+    return _by_each_actuator(fit, np.sign(np.where(np.abs(way) > least, way, 0.0)))
 
 
-def _warming(fit: Fit) -> FloatArray | None:
+def _warming(fit: Fit) -> Columns:
     """All actuators become longer alike while it is measured."""
     equations, count = fit.equations, len(fit.end.pose)
     when = np.zeros(count)
@@ -113,63 +124,71 @@ def _warming(fit: Fit) -> FloatArray | None:
         m = data.measured
         time = data.rows.astype(float) if m.time is None else m.time
         when[equations.table.pose_of[i]] = time
-    return _moved(fit, _by_actuators(fit).sum(axis=2, keepdims=True) * when[:, None, None])
+    return _by_all_actuators(fit, when[:, None])
 
 
-def _by_place(fit: Fit) -> FloatArray | None:
+def _by_place(fit: Fit) -> Columns:
     """All actuators are longer by where the machine is: along x, y and z."""
     place = fit.end.pose[:, :3] - fit.end.pose[:, :3].mean(axis=0)
-    place = np.where(_travelled(fit, place), place, 0.0)
-    return _moved(fit, _by_actuators(fit).sum(axis=2, keepdims=True) * place[:, None, :])
+    return _by_all_actuators(fit, np.where(_travelled(fit, place), place, 0.0))
 
 
-def _curved(fit: Fit) -> FloatArray | None:
+def _curved(fit: Fit) -> Columns:
     """Each actuator has an error that is quadratic in its reading."""
-    off = fit.end.actuators - fit.end.actuators.mean(axis=0)
-    return _moved(fit, _by_actuators(fit) * off[:, None, :] ** 2)
+    return _by_each_actuator(fit, (fit.end.actuators - fit.end.actuators.mean(axis=0)) ** 2)
 
 
-def _sag(fit: Fit) -> FloatArray | None:
-    """Each actuator yields to the weight of the platform, a force along -z at its origin."""
-    twists = _by_actuators(fit)
-    return _moved(fit, twists * -twists[:, 5:6, :])
+def _sag(fit: Fit) -> Columns | None:
+    """Each actuator yields to the weight of the platform, a force along -z at its origin.
+
+    Arms yield to the weight of their links: a check of its own tests that at poses left out.
+    """
+    if isinstance(fit.parameters.robot, ArmMachine):
+        return None
+
+    def twists(poses: IntArray) -> FloatArray:
+        found = _by_actuators(fit, poses)
+        return found * -found[:, 5:6, :]
+
+    return of_poses(fit, twists)
 
 
-def _numbers(stated: StatedUncertainty) -> Callable[[Fit], FloatArray | None]:
+def _numbers(stated: StatedUncertainty) -> Callable[[Fit], Columns | None]:
     """Columns of numbers that the fit held."""
 
-    def columns(fit: Fit) -> FloatArray | None:
+    def columns(fit: Fit) -> Columns | None:
         held = held_numbers(fit.uncertainty, fit.end, stated)
         return None if held is None else held.columns
 
     return columns
 
 
-def _gains(fit: Fit) -> FloatArray | None:
+def _gains(fit: Fit) -> Columns | None:
     names = fit.parameters.robot.geometry.names
     if not any(re.fullmatch(r"gain\d+", name) for name in names):
         return None
     return _numbers(StatedUncertainty({"gain*": 1.0}))(fit)
 
 
-def _lean(fit: Fit) -> FloatArray | None:
+def _lean(fit: Fit) -> Columns | None:
     """All targets sit elsewhere by the same: on the platform, where they are known."""
-    sure, parts = fit.uncertainty, []
-    for data, seen in zip(
-        fit.equations.prediction.datasets, fit.equations.prediction.predicted(fit.end), strict=True
-    ):
-        known = any(
+    known = [
+        any(
             each.role == each.argument == "target" and not each.estimated
             for each in data.dependences()
         )
-        shape = (*seen.values.shape, 3)
-        parts.append(seen.by["target"] if known and "target" in seen.by else np.zeros(shape))
-    if not any(part.any() for part in parts):
-        return None
-    return sure.equations.whitening.whitened(parts, sure.factors)
+        for data in fit.equations.prediction.datasets
+    ]
+
+    def change(i: int, rows: slice, seen: Predicted) -> FloatArray:
+        if known[i] and "target" in seen.by:
+            return seen.by["target"][rows]
+        return np.zeros((*seen.values[rows].shape, 3))
+
+    return of_rows(fit, change) if any(known) else None
 
 
-def _joints(fit: Fit) -> FloatArray | None:
+def _joints(fit: Fit) -> Columns | None:
     names = fit.parameters.robot.geometry.names
     kinds = [p for p in ("base*", "platform*", "rod*", "crank*") if _some(p, names)]
     if not kinds:
@@ -180,6 +199,21 @@ def _joints(fit: Fit) -> FloatArray | None:
 def _some(pattern: str, names: object) -> bool:
     stem = pattern.rstrip("*")
     return any(re.match(rf"{stem}\d", name) for name in names)  # type: ignore[attr-defined]
+
+
+def _of_gears(effect: Harmonics | Coupling) -> Callable[[Fit], Columns | None]:
+    """Columns of an effect of an arm's gears."""
+
+    def columns(fit: Fit) -> Columns | None:
+        machine = fit.parameters.robot
+        if not isinstance(machine, ArmMachine):
+            return None
+        try:
+            return effect_columns(fit, [effect.of_machine(machine)])
+        except ArgumentError:  # fewer joints than it has, or the fit has these numbers
+            return None
+
+    return columns
 
 
 CAUSES = (
@@ -197,6 +231,14 @@ CAUSES = (
     Cause(
         "sag under the platform's weight", "state stiffness and mass, and find compliances", _sag
     ),
+    Cause(
+        "eccentric encoders or tilted joints: a wave a turn", "--effects harmonics=1",
+        _of_gears(Harmonics(1)),
+    ),
+    Cause(
+        "coupled joints of the wrist", "--effects coupling=5.4:6.4:6.5",
+        _of_gears(Coupling(((5, 4), (6, 4), (6, 5)))),
+    ),
     Cause("gains", "--free 'gain*' beside the others, or --uncertainty 'gain*=…'", _gains),
     Cause(
         "the scale of the instrument",
@@ -205,14 +247,14 @@ CAUSES = (
     ),
     Cause("targets elsewhere on the platform", "--target unknown (unknown='target')", _lean),
     Cause("joints elsewhere", "--free them, or --uncertainty 'base*=…'", _joints),
-)
+)  # fmt: skip
 
 
-def possible(fit: Fit) -> Iterator[tuple[Cause, FloatArray]]:
+def possible(fit: Fit) -> Iterator[tuple[Cause, Columns]]:
     """The causes that there may be in this fit, and their columns."""
     for cause in CAUSES:
         columns = cause.columns(fit)
-        if columns is not None and columns.any():
+        if columns is not None:
             yield cause, columns
 
 

@@ -11,8 +11,8 @@ from pkmcal.fitted.solution import Solution
 from pkmcal.statistics.causes import causes
 
 CHANCE = 0.05  # of naming any cause of a sound machine
-_SURE = 0.01  # below which one that moves the numbers makes a result doubtful
-_HARMFUL = 1.0  # standard deviations, rms over the parameters
+SURE = 0.01  # below which one that moves the numbers makes a result doubtful
+HARMFUL = 1.0  # standard deviations, rms over the parameters
 _MOST = 3  # that are named
 _FEW = 10.0  # degrees of freedom below which residuals tell no causes apart
 
@@ -66,7 +66,7 @@ def found_causes(found: Solution) -> tuple[FoundCause, ...]:
 
 
 def _level(found: Solution, cause: FoundCause) -> Level:
-    return "doubt" if cause.chance < _SURE and cause.shift > _HARMFUL else "remark"
+    return "doubt" if cause.chance < SURE and cause.shift > HARMFUL else "remark"
 
 
 def _text(found: Solution, cause: FoundCause) -> str:
@@ -82,6 +82,6 @@ CHECKS = (
     Check(
         name="causes", about="a cause that is not in the model would explain residuals",
         levels=("doubt", "remark"), level_of=_level, run=found_causes, say=_text,
-        unless=("grave",),
+        unless=("grave", "sag-lacking"),
     ),
 )  # fmt: skip

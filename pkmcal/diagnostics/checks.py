@@ -12,6 +12,7 @@ from pkmcal.diagnostics import (
     machine,
     noise,
     priors,
+    refitted_readings,
     regions,
     rounded,
     rows,
@@ -23,8 +24,9 @@ from pkmcal.diagnostics import (
 from pkmcal.diagnostics.diagnosis import verified
 
 CHECKS = verified((
-    *held_out.CHECKS, *units.CHECKS, *families.CHECKS, *machine.CHECKS, *loads.CHECKS,
-    *search.CHECKS, *rows.CHECKS, *rounded.CHECKS, *noise.CHECKS, *priors.CHECKS, *course.CHECKS,
-    *causes.CHECKS, *regions.CHECKS, *gain.CHECKS, *sag.CHECKS, *waves.CHECKS,
+    *held_out.CHECKS, *units.CHECKS, *refitted_readings.CHECKS, *families.CHECKS,
+    *machine.CHECKS, *loads.CHECKS, *search.CHECKS, *rows.CHECKS, *rounded.CHECKS, *noise.CHECKS,
+    *priors.CHECKS, *course.CHECKS, *causes.CHECKS, *regions.CHECKS, *gain.CHECKS,
+    *sag.CHECKS, *waves.CHECKS,
 ))  # fmt: skip
 AT_ONCE = tuple(check for check in CHECKS if check.at_once)

@@ -13,11 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray
+from pkmcal.diagnostics.columns import of_rows
 from pkmcal.display import chance_text, displayed, printable
 from pkmcal.estimation.fit_data import Dependence
 from pkmcal.estimation.uncertainty import Uncertainty
 from pkmcal.fitted.fit import Fit
-from pkmcal.statistics.score_test import Score, score_test
+from pkmcal.readings.reading import Predicted
+from pkmcal.statistics.score_test import Columns, Score, score_test
 
 CHANCE = 0.01  # below which a target is said to be displaced
 _LARGE = 0.5  # of the squared residuals, from which they are little else
@@ -145,13 +147,12 @@ def _name(fit: Fit, place: FloatArray, rows: list[BoolArray]) -> str:
     return f"({', '.join(f'{value:g}' for value in place)})"
 
 
-def _columns(fit: Fit, rows: list[BoolArray]) -> FloatArray:
-    """How equations (M, 3) change with the place of the target of these rows."""
-    sure = fit.uncertainty
-    parts = [
-        np.where(mine[:, None, None], seen.by["target"], 0.0)
-        if "target" in seen.by
-        else np.zeros((*seen.values.shape, 3))
-        for seen, mine in zip(fit.equations.prediction.predicted(fit.end), rows, strict=True)
-    ]
-    return sure.equations.whitening.whitened(parts, sure.factors)
+def _columns(fit: Fit, mine: list[BoolArray]) -> Columns:
+    """How equations change with the place of the target of these rows of each set."""
+
+    def change(i: int, rows: slice, seen: Predicted) -> FloatArray:
+        if "target" not in seen.by:
+            return np.zeros((*seen.values[rows].shape, 3))
+        return np.where(mine[i][rows, None, None], seen.by["target"][rows], 0.0)
+
+    return of_rows(fit, change)

@@ -12,10 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import FloatArray
+from pkmcal.diagnostics.columns import of_rows
 from pkmcal.diagnostics.visits import visits_of
 from pkmcal.display import chance_text
 from pkmcal.fitted.solution import Solution
-from pkmcal.statistics.score_test import score_test
+from pkmcal.readings.reading import Predicted
+from pkmcal.statistics.score_test import Columns, beside
 
 CHANCE = 1e-3  # below which readings are late
 
@@ -71,36 +73,41 @@ class Late:
 
 
 def late(found: Solution) -> Late | None:
-    """Test it; None where rows are mixtures, or residuals rounding errors."""
+    """Test it; None where chance explains as much, or rows are mixtures, residuals rounding."""
     sure = found.fit.uncertainty
     if sure.mixed or sure.rounded or not sure.equations.whitening.any_read:
         return None
     visits = visits_of(found)
     tested = {
-        leaving: score_test(sure.fit, _columns(found, place))
+        leaving: beside(sure.fit, _columns(found, place))
         for leaving, place in ((False, visits.before), (True, visits.after))
     }
-    known = {leaving: score for leaving, score in tested.items() if score is not None}
+    ways = {leaving: each for leaving, each in tested.items() if each is not None}
+    # shared errors make as much more likely: of what is likely without them nothing else is asked
+    scores = {
+        leaving: each.score() for leaving, each in ways.items() if len(ways) * each.chance < CHANCE
+    }
+    known = {leaving: score for leaving, score in scores.items() if score is not None}
     if not known:
         return None
     leaving = min(known, key=lambda each: (known[each].chance, -known[each].drop))
     score = known[leaving]
-    chance = min(1.0, len(known) * score.chance)
+    chance = min(1.0, len(ways) * score.chance)
     return Late(float(score.size[0]), float(score.deviation[0]), chance, leaving)
 
 
-def _columns(found: Solution, place: FloatArray) -> FloatArray:
-    """How equations (M, 1) change with the share of the way to places (N, n) that readings are off.
+def _columns(found: Solution, place: FloatArray) -> Columns:
+    """How equations change with the share of the way to places (N, n) that readings are off.
 
     The places are actuator readings.
     """
     fit = found.fit
-    sure, equations, end = fit.uncertainty, fit.equations, fit.end
-    way = place - np.concatenate([m.actuators for m in equations.table.sets])
-    twists = end.machines.actuator_twists(end.states)[np.concatenate(equations.table.pose_of)]
-    back = np.split(
-        (twists @ way[:, :, None])[:, :, 0], np.cumsum([len(m) for m in equations.table.sets])[:-1]
-    )
-    seen = equations.prediction.predicted(end)
-    parts = [each.by_twist @ own[:, :, None] for each, own in zip(seen, back, strict=True)]
-    return sure.equations.whitening.whitened(parts, sure.factors)
+    table, end = fit.equations.table, fit.end
+    first = np.cumsum([0, *map(len, table.sets)])
+
+    def change(i: int, rows: slice, seen: Predicted) -> FloatArray:
+        way = place[first[i] : first[i + 1]][rows] - table.sets[i].actuators[rows]
+        twists = end.machines.actuator_twists(end.states, table.pose_of[i][rows])
+        return seen.by_twist[rows] @ (twists @ way[:, :, None])
+
+    return of_rows(fit, change)

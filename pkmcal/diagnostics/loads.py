@@ -10,6 +10,7 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray
 from pkmcal.diagnostics.check import Check, Level, Remedy, at_most_one
+from pkmcal.diagnostics.columns import of_rows
 from pkmcal.display import chance_text
 from pkmcal.effects.elasticity import Elasticity
 from pkmcal.exceptions import ArgumentError
@@ -17,12 +18,13 @@ from pkmcal.fitted.fit import Fit
 from pkmcal.fitted.solution import Solution
 from pkmcal.geometry.carried import Load
 from pkmcal.geometry.elastic import COMPLIANCE
-from pkmcal.kinematics.robot import Robot
-from pkmcal.statistics.score_test import score_test
+from pkmcal.kinematics.calibratable import ArmMachine, Calibratable
+from pkmcal.readings.reading import Predicted
+from pkmcal.statistics.score_test import Columns, score_test
 
 CHANCE = 0.01  # below which residuals follow the loads
 _UNSURE = 0.2  # share of a compliance that its standard deviation exceeds where loads are alike
-_OF_LEGS = Elasticity("offset*")
+_OF_LEGS, _OF_JOINTS = Elasticity("offset*"), Elasticity("joint*")
 
 
 class IgnoredLoads(NamedTuple):
@@ -39,12 +41,12 @@ class IgnoredLoads(NamedTuple):
 
 def _ignored(found: Solution) -> tuple[IgnoredLoads, ...]:
     fit, robot = found.fit, found.fit.parameters.robot
-    if isinstance(robot, Robot) and robot.model.elastic is not None:
+    if robot.yields:
         return ()
     if not any(m.load is not None and m.load.any() for m in fit.equations.table.sets):
         return ()
     sure = fit.uncertainty
-    if not isinstance(robot, Robot) or sure.mixed or sure.rounded:
+    if sure.mixed or sure.rounded:
         return (IgnoredLoads(float("nan")),)
     with suppress(ArgumentError):  # limbs without such numbers, or with shared forces
         score = score_test(sure.fit, _by_compliances(fit, robot))
@@ -52,17 +54,25 @@ def _ignored(found: Solution) -> tuple[IgnoredLoads, ...]:
     return (IgnoredLoads(float("nan")),)
 
 
-def _by_compliances(fit: Fit, robot: Robot) -> FloatArray:
-    """How equations (M, s) change with compliances of legs and screws that are held at 0."""
-    _, soft, freed = _OF_LEGS.of_machine(robot)
+def _of_loads(robot: Calibratable) -> Elasticity:
+    """What of a machine follows loads first: legs and screws, or joints of an arm."""
+    return _OF_JOINTS if isinstance(robot, ArmMachine) else _OF_LEGS
+
+
+def _by_compliances(fit: Fit, robot: Calibratable) -> Columns:
+    """How equations change with compliances that are held at 0."""
+    _, soft, freed = _of_loads(robot).of_machine(robot)
     places = [soft.geometry.names.index(name) for name in freed]
-    table, sure, parts = fit.equations.table, fit.uncertainty, []
-    predicted = fit.equations.prediction.predicted(fit.end)
-    for m, place, seen in zip(table.sets, table.pose_of, predicted, strict=True):
-        carrying = soft if m.load is None else soft.under(Load.of_rows(m.load))
+    table = fit.equations.table
+
+    def change(i: int, rows: slice, seen: Predicted) -> FloatArray:
+        place, load = table.pose_of[i][rows], table.sets[i].load
+        carrying = soft if load is None else soft.under(Load.of_rows(load[rows]))
         twists = carrying.error_twists(fit.end.pose[place], table.actuators[place])
-        parts.append(seen.by_twist @ twists[..., places])
-    return sure.equations.whitening.whitened(parts, sure.factors)
+        moved: FloatArray = seen.by_twist[rows] @ twists[..., places]
+        return moved
+
+    return of_rows(fit, change)
 
 
 def _ignored_level(found: Solution, seen: IgnoredLoads) -> Level:
@@ -74,17 +84,19 @@ def _ignored_text(found: Solution, seen: IgnoredLoads) -> str:
     least, most = masses.min(), masses.max()
     carried = "loads of the rows" if not most else f"loads of the rows, {least:g} to {most:g} kg,"
     if seen.chance < CHANCE:
+        numbers = _of_loads(found.fit.parameters.robot).numbers
         return (
             f"residuals follow the {carried} ({chance_text(seen.chance)}): the machine yields; find"
-            " its compliances, --effects 'elasticity=offset*' (effects=[pk.Elasticity('offset*')])"
+            f" its compliances, --effects 'elasticity={numbers}' (effects=[pk.Elasticity"
+            f"('{numbers}')])"
         )
     return f"the {carried} are not taken into account: nothing of the machine yields"
 
 
 def _compliances(found: Solution) -> Iterator[tuple[str, float, float]]:
-    """Estimated compliances: names, values, deviations."""
+    """Estimated compliances of limbs and joints: names, values, deviations."""
     for name, value, sigma in zip(found.free, found.values, found.stderr, strict=True):
-        if name.startswith(COMPLIANCE):
+        if name.startswith(COMPLIANCE.removesuffix(".")):
             yield name, float(value), float(sigma)
 
 
@@ -109,7 +121,7 @@ CHECKS = (
     Check(
         name="ignored-loads", about="rows state loads, and nothing of the machine yields",
         levels=("doubt", "remark"), run=_ignored, level_of=_ignored_level, say=_ignored_text,
-        remedies=lambda found, seen: (Remedy("effects", (_OF_LEGS,)),),
+        remedies=lambda found, seen: (Remedy("effects", (_of_loads(found.fit.parameters.robot),)),),
     ),
     Check(
         name="negative-compliance", about="a compliance is below 0, as of no spring",

@@ -37,6 +37,16 @@ def other_readings(
             yield f"the actuators are in {name}", replace(measured, actuators=q)
     yield "the actuators count the other way", replace(measured, actuators=-measured.actuators)
     yield from exchanges(measured)
+    yield from other_values(measured)
+    for i, unit in enumerate(actuator_units):
+        for words, factor in (*_FACTORS.get(unit, ()), (_REVERSED, -1.0)):
+            q = measured.actuators.copy()
+            q[:, i] *= factor
+            yield _of_column(f"q{i + 1}", words), replace(measured, actuators=q)
+
+
+def other_values(measured: Measurements) -> Iterator[tuple[str, Measurements]]:
+    """Read what was measured in other units, orders and with other signs; actuators as given."""
     for unit in dict.fromkeys(measured.units):
         mine = np.array([unit == other for other in measured.units])
         what = Family(unit).noun.replace("lengths", "measured lengths")
@@ -51,18 +61,11 @@ def other_readings(
         values[:, [one, other]] = values[:, [other, one]]
         yield f"{names[one]} and {names[other]} are exchanged", replace(measured, values=values)
     yield from _other_turns(measured)
-    yield from _single_columns(measured, actuator_units)
+    yield from _single_columns(measured)
 
 
-def _single_columns(
-    measured: Measurements, actuator_units: Sequence[str]
-) -> Iterator[tuple[str, Measurements]]:
-    """Read one column in another unit, or with the other sign."""
-    for i, unit in enumerate(actuator_units):
-        for words, factor in (*_FACTORS.get(unit, ()), (_REVERSED, -1.0)):
-            q = measured.actuators.copy()
-            q[:, i] *= factor
-            yield _of_column(f"q{i + 1}", words), replace(measured, actuators=q)
+def _single_columns(measured: Measurements) -> Iterator[tuple[str, Measurements]]:
+    """Read one column of what was measured in another unit, or with the other sign."""
     rows = measured.values.reshape(len(measured), -1)
     for k, (name, unit) in enumerate(zip(measured.components, measured.units, strict=True)):
         for words, factor in (*_FACTORS.get(unit, ()), (_REVERSED, -1.0)):

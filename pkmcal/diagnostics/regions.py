@@ -11,7 +11,7 @@ from pkmcal.diagnostics.check import Check, at_most_one
 from pkmcal.display import chance_text
 from pkmcal.fitted.fit import Fit
 from pkmcal.fitted.solution import Solution
-from pkmcal.statistics.left_out import left_out
+from pkmcal.statistics.left_out import left_out, residuals_left_out
 from pkmcal.statistics.linear_fit import numbered
 from pkmcal.statistics.singular_values import svd
 
@@ -70,7 +70,7 @@ def cross_validations(found: Solution) -> tuple[CrossValidation, ...]:
         session = np.unique(np.concatenate(known), return_inverse=True)[1]
         if session.max() > 0:
             blocks["sessions"] = session[row]
-    by_pose = left_out(sure.fit, numbered(pose)).residual
+    by_pose = residuals_left_out(sure.fit, numbered(pose))
     at_random = _rms(fit, by_pose)
     tested = {name: left_out(sure.fit, block) for name, block in blocks.items()}
     return tuple(

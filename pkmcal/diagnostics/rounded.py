@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray
+from pkmcal.arrays import FloatArray, lots
 from pkmcal.diagnostics.check import Check, Level, Remedy
 from pkmcal.display import displayed
 from pkmcal.estimation.coarse_readings import DITHERED, Coarse
+from pkmcal.estimation.cut_readings import Cut
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.misfits import rounding_of
 from pkmcal.fitted.row_names import row_names
@@ -69,14 +70,16 @@ def _reach_of_actuators(found: Solution, at: Evaluation) -> list[FloatArray]:
     equations, units = found.fit.equations, at.robot.actuator_units
     read = equations.table.actuators
     half = np.array([0.5 * step_of(read[:, a], unit) for a, unit in enumerate(units)])
-    by_actuators = at.machines.actuator_twists(at.states)
-    reach = []
+    table, reach = equations.table, []
     for i, seen in enumerate(equations.prediction.predicted(at)):
-        moved = np.abs(seen.by_twist @ by_actuators[equations.table.pose_of[i]]) @ half
-        other = equations.table.other_of[i]
-        if other is not None and seen.by_other is not None:
-            moved += np.abs(seen.by_other @ by_actuators[other]) @ half
-        reach.append(moved)
+        whole, other = np.empty(seen.values.shape), table.other_of[i]
+        for rows in lots(len(whole)):
+            twists = at.machines.actuator_twists(at.states, table.pose_of[i][rows])
+            whole[rows] = np.abs(seen.by_twist[rows] @ twists) @ half
+            if other is not None and seen.by_other is not None:
+                twists = at.machines.actuator_twists(at.states, other[rows])
+                whole[rows] += np.abs(seen.by_other[rows] @ twists) @ half
+        reach.append(whole)
     return reach
 
 
@@ -153,6 +156,50 @@ def _steps_text(found: Solution, seen: CoarseSteps) -> str:
     return f"{what} below the {floor} of rounding alone, which ± allow for"
 
 
+# steps that were cut ------------------------------------------------------------------------------
+
+
+def _cut(found: Solution) -> Iterator[Cut]:
+    """Readings that were cut; those of which it cannot be told, where that matters."""
+    sure = found.fit.uncertainty
+    seen = [each for each in sure.cut if each.seen]
+    if seen or not sure.known:
+        yield from (max(each, key=lambda cut: cut.size / cut.deviation) for each in _by_set(seen))
+        return
+    noise = np.diagonal(sure.covariance.of(sure.reported))
+    for several in _by_set([each for each in sure.cut if not each.refuted]):
+        offsets = np.array([sure.reported @ each.error for each in several])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            wider = np.sqrt(1.0 + (offsets**2).sum(axis=0) / noise)
+        if np.nanmax(np.where(noise > 0.0, wider, np.nan), initial=0.0) > _WIDER:
+            yield several[0]
+
+
+def _by_set(several: Sequence[Cut]) -> list[list[Cut]]:
+    return [
+        [each for each in several if each.set == i]
+        for i in dict.fromkeys(each.set for each in several)
+    ]
+
+
+def _cut_text(found: Solution, cut: Cut) -> str:
+    m = found.fit.equations.table.sets[cut.set]
+    named = [
+        (m.components[each.component], m.units[each.component], each) for each in cut.components
+    ]
+    what = ", ".join(f"{name} ({_shown(each.step, unit)[1]})" for name, unit, each in named)
+    if not cut.seen:
+        return (
+            f"whether readings in steps, {what}, were rounded or cut cannot be told from them: ±"
+            " allow for half a step in all rows alike"
+        )
+    way = "towards zero" if cut.to_zero else "to the step below"
+    return (
+        f"readings in steps, {what}, are as if cut {way}, not rounded: they are off by"
+        f" {cut.size:.2g} ± {cut.deviation:.1g} half steps; add half a step to what was cut"
+    )
+
+
 # readings at a stop -------------------------------------------------------------------------------
 
 
@@ -220,6 +267,11 @@ CHECKS = (
         about="residuals are smaller than the steps in which was read hide",
         unless=("nothing-measured",), levels=("doubt", "remark"), run=_coarse_steps,
         level_of=_level_of_steps, say=_steps_text,
+    ),
+    Check(
+        name="cut-readings", about="readings in steps were cut, not rounded; or nothing tells it",
+        unless=("nothing-measured",), levels=("doubt", "remark"), run=_cut,
+        level_of=lambda found, cut: "doubt" if cut.seen else "remark", say=_cut_text,
     ),
     Check(
         name="at-stop", about="many readings equal the largest or the smallest one", run=_at_stop,

@@ -4,30 +4,32 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from pkmcal.diagnostics.causes import HARMFUL, SURE
 from pkmcal.diagnostics.check import Check, Remedy, at_most_one
 from pkmcal.effects.effect import Changed
 from pkmcal.effects.sag import Sag
 from pkmcal.exceptions import ArgumentError
 from pkmcal.fitted.fit import Fit
-from pkmcal.fitted.left_out import Comparison, compared_by_poses
+from pkmcal.fitted.left_out import Comparison, compared_by_poses, effect_columns
 from pkmcal.fitted.solution import Solution
 from pkmcal.kinematics.calibratable import ArmMachine, Calibratable
+from pkmcal.statistics.causes import causes
 
 NUMBERS = ("sag", "compliance")  # with which the names of sag begin
 
 
 class SagFinding(NamedTuple):
-    """What sag gains.
+    """What sag gains that a fit lacks.
 
     Attributes
     ----------
-    effect : Sag or None
-        What would help; None where the fit has it.
+    effect : Sag
+        What would help.
     comparison : Comparison
         The poses left out.
     """
 
-    effect: Sag | None
+    effect: Sag
     comparison: Comparison
 
 
@@ -72,26 +74,39 @@ def _of_sag(fit: Fit) -> list[str]:
     ]
 
 
-def _found(found: Solution) -> SagFinding | None:
-    fit = found.fit
-    if not isinstance(fit.parameters.robot, ArmMachine):
-        return None
-    names = _of_sag(fit)
-    if not names:
-        return sag_that_helps(fit)
-    gained = compared_by_poses(fit, lacking=names)
-    return None if gained is None else SagFinding(None, gained)
+def _lacking(found: Solution) -> tuple[tuple[SagFinding, float], ...]:
+    """What sag gains that the fit lacks, and how far it moves the numbers, in their ±."""
+    helps = sag_that_helps(found.fit)
+    if helps is None:
+        return ()
+    changed = helps.effect.of_machine(found.fit.parameters.robot)
+    columns = effect_columns(found.fit, [changed])
+    seen = [] if columns is None else causes(found.fit.uncertainty.fit, [columns], SURE, 1)
+    return ((helps, seen[0].shift if seen else 0.0),)
 
 
-def _say(found: Solution, finding: SagFinding) -> str:
-    effect, gained = finding
-    figures = f"{gained} ({len(gained.numbers)} numbers, t {gained.t:.2g})"
-    if effect is not None:
-        joints = sorted({name.partition(".")[0].removeprefix("sag") for name in gained.numbers})
-        return (
-            f"residuals follow the torque of gravity on joints {', '.join(joints)}: {figures} with"
-            f" {Remedy('effects', (effect,))}"
-        )
+def _in_it(found: Solution) -> tuple[Comparison, ...]:
+    """What the sag gains that was found."""
+    names = _of_sag(found.fit)
+    return at_most_one(compared_by_poses(found.fit, lacking=names) if names else None)
+
+
+def _figures(gained: Comparison) -> str:
+    return f"{gained} ({len(gained.numbers)} numbers, t {gained.t:.2g})"
+
+
+def _say_lacking(found: Solution, finding: tuple[SagFinding, float]) -> str:
+    (effect, gained), shift = finding
+    joints = sorted({name.partition(".")[0].removeprefix("sag") for name in gained.numbers})
+    harm = f", and the numbers move by {shift:.2g} of their ±" if shift > 0.5 else ""
+    return (
+        f"residuals follow the torque of gravity on joints {', '.join(joints)}: {_figures(gained)}"
+        f" with {Remedy('effects', (effect,))}{harm}"
+    )
+
+
+def _say_in_it(found: Solution, gained: Comparison) -> str:
+    figures = _figures(gained)
     if not gained.passes:
         return f"sag does not help beyond chance: {figures}; --effects none leaves it out"
     better = min(gained.before, gained.alone)
@@ -100,12 +115,14 @@ def _say(found: Solution, finding: SagFinding) -> str:
 
 CHECKS = (
     Check(
-        name="sag", about="joints of an arm that yield under its weight",
-        levels=("remark",),
-        run=lambda found: at_most_one(_found(found)),
-        say=_say,
-        remedies=lambda found, finding: (
-            () if finding.effect is None else (Remedy("effects", (finding.effect,)),)
-        ),
+        name="sag-lacking", about="joints of an arm yield under its weight, and nothing says so",
+        levels=("doubt", "remark"),
+        level_of=lambda found, finding: "doubt" if finding[1] > HARMFUL else "remark",
+        run=_lacking, say=_say_lacking,
+        remedies=lambda found, finding: (Remedy("effects", (finding[0].effect,)),),
+    ),
+    Check(
+        name="sag", about="whether sag of an arm that was found helps",
+        levels=("remark",), run=_in_it, say=_say_in_it,
     ),
 )  # fmt: skip

@@ -11,7 +11,7 @@ from pkmcal.arrays import BoolArray, FloatArray
 from pkmcal.diagnostics.visits import Visits, visits_of
 from pkmcal.display import chance_text, printable
 from pkmcal.fitted.solution import Solution
-from pkmcal.statistics.group_test import few_equations, group_test
+from pkmcal.statistics.group_test import few_equations
 from pkmcal.statistics.linear_fit import column_basis, numbered
 
 CHANCE = 1e-3  # below which a group of rows is of another machine
@@ -83,10 +83,7 @@ def apart(found: Solution) -> Apart | None:
         cell = numbered(cell, mine[row].astype(np.intp))
     few = few_equations(sure.fit.design, sure.fit.residual, use, key, cell)
     first = np.unique(cell, return_index=True)[1]  # an equation of each cell
-    tested = {
-        name: group_test(few.design, few.residual, mine[row][first][few.cell], few.count)
-        for name, mine in groups.items()
-    }
+    tested = {name: few.tested(mine[row][first][few.cell]) for name, mine in groups.items()}
     known = {name: each for name, each in tested.items() if each is not None}
     if not known:
         return None

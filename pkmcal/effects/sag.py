@@ -9,15 +9,14 @@ as much (`Sag(tied=True)`), and what another payload does.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 import numpy as np
 
 from pkmcal.arguments import instance, number
-from pkmcal.arms import urdf
 from pkmcal.arms.arm import SerialArm
-from pkmcal.arms.joint_laws import JointLaws, Term, sag_term
+from pkmcal.arms.joint_laws import Term, sag_term
 from pkmcal.arms.weights import gravity_products, gravity_torques
 from pkmcal.arrays import FloatArray
 from pkmcal.effects.effect import Changed
@@ -129,8 +128,7 @@ def _bare(arm: SerialArm) -> SerialArm:
 
 
 def _gravity(arm: SerialArm) -> FloatArray:
-    laws = arm.laws or JointLaws(arm.axes, arm.points, arm.kinds, {})
-    return np.array(laws.gravity)
+    return np.array(arm.joint_laws.pulls.gravity)
 
 
 def _products(arm: SerialArm) -> FloatArray:
@@ -169,18 +167,16 @@ def _independent(arm: SerialArm, joints: Sequence[int]) -> list[Term]:
 
 def _tied(arm: SerialArm, joints: Sequence[int], turns: float) -> Changed:
     """The arm with a compliance of each of these joints."""
-    laws = arm.laws or JointLaws(arm.axes, arm.points, arm.kinds, {})
-    if laws.masses is None or laws.centres is None:
-        if arm.source is None:
-            raise ArgumentError(
-                "sag: tied needs masses: keys mass and centre of the joints in the arm's file, or"
-                " inertials in its URDF"
-            )
-        masses, centres = urdf.weights(*arm.source)
-        laws = replace(laws, masses=masses, centres=centres)
-    assert laws.masses is not None and laws.centres is not None
+    arm = arm.weighed()
+    pulls = arm.joint_laws.pulls
+    assert pulls.masses is not None and pulls.centres is not None
+    if not pulls.masses.any():
+        raise ArgumentError(
+            "sag: tied needs masses: keys mass and centre of the joints in the arm's file, or"
+            " inertials in its URDF"
+        )
     torques = gravity_torques(
-        _bare(arm), _postures(arm), laws.masses, laws.centres, np.array(laws.gravity)
+        _bare(arm), _postures(arm), pulls.masses, pulls.centres, _gravity(arm)
     )
     size = np.sqrt(np.mean(torques**2, axis=0))
     own = {}
@@ -188,5 +184,6 @@ def _tied(arm: SerialArm, joints: Sequence[int], turns: float) -> Changed:
         if not size[i] > 0.0:
             raise ArgumentError(f"sag: the links behind joint {i + 1} weigh nothing")
         own[Term(i, "compliance")] = turns / float(size[i])
-    changed = arm.with_laws(laws.with_terms(own))
-    return Changed("sag", ArmMachine(changed), {term.name: each for term, each in own.items()})
+    return Changed(
+        "sag", ArmMachine(arm.with_terms(own)), {term.name: each for term, each in own.items()}
+    )

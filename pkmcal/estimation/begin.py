@@ -12,7 +12,7 @@ from pkmcal.estimation.loss import LossName
 from pkmcal.estimation.mode_slips import start_in_modes
 from pkmcal.estimation.parameters import Parameters
 from pkmcal.estimation.pose_minima import in_least_minima
-from pkmcal.exceptions import ArgumentError
+from pkmcal.exceptions import FitError
 
 
 def begun(
@@ -41,8 +41,8 @@ def estimator_at(
         Rows that were not reached.
     """
     if not start.ok and exact is equations:
-        raise ArgumentError(exact.failures(start))
+        raise FitError(exact.failures(start))
     equations, own = equations.begin(start)
     if not own.ok:
-        raise ArgumentError(equations.failures(own))
+        raise FitError(equations.failures(own))
     return Estimator(equations, own, loss)

@@ -1,4 +1,4 @@
-"""Components of what was read whose residuals are no larger than the steps of the readings."""
+"""Components that were read in steps which matter beside the residuals."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from pkmcal.statistics.linear_fit import LinearFit
 from pkmcal.statistics.steps import deviation, step_of
 
 DITHERED = 1.5  # times a step's deviation, from which residuals are noise that spreads the steps
+_MATTERS = 0.6  # times the residuals, from which half a step in all rows is more than their mean's
 
 
 @dataclass(frozen=True)
@@ -87,4 +88,4 @@ def component_of(equations: Equations) -> IntArray:
 def _least(*deviations: float) -> float:
     """The smallest step that matters beside the smaller of these deviations."""
     known = [each for each in deviations if np.isfinite(each)]
-    return min(known, default=0.0) / (DITHERED * deviation(1.0))
+    return _MATTERS * min(known, default=0.0)

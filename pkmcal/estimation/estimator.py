@@ -18,7 +18,7 @@ from pkmcal.estimation.identifiability import (
 )
 from pkmcal.estimation.least_squares import Search, SingularError, Trail
 from pkmcal.estimation.loss import Loss, LossName
-from pkmcal.exceptions import ArgumentError
+from pkmcal.exceptions import FitError
 from pkmcal.statistics import prior_test
 from pkmcal.statistics.linear_fit import (
     column_basis,
@@ -83,7 +83,7 @@ class Estimator:
         state = replace(self._state(noise, self._first_loss(), size), first_freedom=freedom)
         if not state.fitted.rank:
             names = ", ".join(self.equations.parameters.names)
-            raise ArgumentError(f"they depend on none of {names}")
+            raise FitError(f"they depend on none of {names}")
         u, trail = np.zeros(len(self.scale)), self.search.begin()
         if near is not None:
             trail = replace(trail, near=near)

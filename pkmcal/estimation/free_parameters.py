@@ -29,9 +29,8 @@ from pkmcal.estimation.sessions import Scope, label, matches, scopes
 from pkmcal.estimation.uncertain_numbers import spread, uncertain_names
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.geometry.elastic import is_kinematic
+from pkmcal.geometry.stated_uncertainty import LEAST, MOST
 from pkmcal.kinematics.calibratable import Calibratable
-
-_LEAST_PRIOR, _MOST_PRIOR = 1e-15, 1e15  # mm or rad, whose squares are numbers
 
 
 def parameters(
@@ -334,10 +333,9 @@ def _positive(what: str, value: object) -> float:
         raise ArgumentTypeError(f"{what} must be a number, a standard deviation; found {value!r}")
     if not value > 0:
         raise ArgumentError(f"{what} must be positive; found {value}")
-    if not (_LEAST_PRIOR <= value <= _MOST_PRIOR or value == np.inf):
+    if not (LEAST <= value <= MOST or value == np.inf):
         raise ArgumentError(
-            f"{what} must lie between {_LEAST_PRIOR:g} and {_MOST_PRIOR:g}, or be inf; found"
-            f" {shown(value)}"
+            f"{what} must lie between {LEAST:g} and {MOST:g}, or be inf; found {shown(value)}"
         )
     return float(value)
 

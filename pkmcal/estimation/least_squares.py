@@ -12,7 +12,7 @@ from pkmcal.estimation.equations import Batch, Equations
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.loss import Loss
 from pkmcal.estimation.misfits import progress, rounding
-from pkmcal.exceptions import ArgumentError
+from pkmcal.exceptions import FitError
 from pkmcal.statistics.linear_fit import triangle
 
 _FTOL = 1e-10  # of the cost: 1e-4 of a standard deviation; rounding moves it by less
@@ -23,7 +23,7 @@ _CONVERGED = (1, 2, 3, 4)  # as MINPACK says it
 Function = Callable[[FloatArray], FloatArray]
 
 
-class SingularError(ArgumentError):
+class SingularError(FitError):
     """A search came to parameters with which the machine is singular in some pose."""
 
 

@@ -107,11 +107,15 @@ class Machines:
             parts.append(found[0] if len(found) == 1 else np.concatenate(found))
         return _joined(parts, self.rows)
 
-    def actuator_twists(self, states: RowStates) -> FloatArray:
-        """Derivative (K, 6, n) of the platform's twist to each actuator coordinate."""
-        return self.joined(
-            lambda robot, own: robot.actuator_twists(states.pose[own], states.actuators[own])
-        )
+    def actuator_twists(self, states: RowStates, poses: IntArray) -> FloatArray:
+        """Derivative (b, 6, n) of the platform's twist to each actuator coordinate, of poses."""
+        found = np.empty((len(poses), 6, states.actuators.shape[1]))
+        for robot, rows in zip(self.robots, self.rows, strict=True):
+            mine = np.flatnonzero(rows.take(np.searchsorted(rows, poses), mode="clip") == poses)
+            own = poses[mine]
+            driven = _driven(robot, self.state.at(own))
+            found[mine] = driven.actuator_twists(states.pose[own], states.actuators[own])
+        return found
 
     # their closures -------------------------------------------------------------------------------
 

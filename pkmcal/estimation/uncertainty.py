@@ -9,6 +9,7 @@ import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.estimation.coarse_readings import Coarse, coarse_readings, component_of
+from pkmcal.estimation.cut_readings import Cut, cut_readings
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.estimate import Estimate
 from pkmcal.estimation.estimator import FEW, Estimator
@@ -60,7 +61,9 @@ class Uncertainty:
     slips : ndarray
         Of each set, `slipped`.
     coarse : tuple of Coarse
-        Components whose residuals are no larger than the steps in which they were read.
+        Components that were read in steps which matter beside the residuals.
+    cut : tuple of Cut
+        Whether these were cut, as far as the fit tells.
     considered : ndarray (p, k) or None
         How the basis follows numbers that are not fitted along, in their stated deviations.
     noise_share : float
@@ -76,6 +79,7 @@ class Uncertainty:
     factors: FloatArray
     slips: FloatArray
     coarse: tuple[Coarse, ...]
+    cut: tuple[Cut, ...]
     considered: FloatArray | None = None
     noise_share: float = 1.0
 
@@ -108,12 +112,19 @@ class Uncertainty:
         return self.covariance.of(self.fit.back) + self._beside(self.fit.back)
 
     def _beside(self, contrasts: FloatArray) -> FloatArray | float:
-        """What numbers that are not fitted along add to the covariance of contrasts (q, p)."""
-        if self.considered is None:
+        """What offsets and numbers not fitted add to the covariance of contrasts (q, p)."""
+        if self._offsets is None:
             return 0.0
-        follow = contrasts @ self.considered
+        follow = contrasts @ self._offsets
         added: FloatArray = follow @ follow.T
         return added
+
+    @cached_property
+    def _offsets(self) -> FloatArray | None:
+        """How the basis (p, k) follows errors that are no noise, in their deviations."""
+        cut = [each.error for each in self.cut if not each.refuted]
+        columns = [*([] if self.considered is None else self.considered.T), *cut]
+        return np.array(columns).T if columns else None
 
     @cached_property
     def freedom(self) -> FloatArray:
@@ -121,10 +132,10 @@ class Uncertainty:
         if not self.known:
             return np.zeros(len(self.reported))
         own = self.covariance.freedom(self.reported)
-        if self.considered is None:
+        if self._offsets is None:
             return own
         data = np.diagonal(self.covariance.of(self.reported))
-        known = ((self.reported @ self.considered) ** 2).sum(axis=1)
+        known = ((self.reported @ self._offsets) ** 2).sum(axis=1)
         with np.errstate(divide="ignore", invalid="ignore"):
             widened: FloatArray = own * (1.0 + known / data) ** 2  # what is stated is known
         return np.where(data > 0.0, widened, own)
@@ -298,6 +309,7 @@ def uncertainty(
         factors=state.noise,
         slips=slips,
         coarse=coarse,
+        cut=tuple(cut_readings(equations, named, fit, state.noise, coarse)),
     )
 
 

@@ -25,6 +25,8 @@ _CELL = re.compile(rb"<(?:\w+:)?c[\s/>]")
 _HIDDEN = re.compile(
     rb"<(?:\w+:)?row(?=\s)(?=[^>]*\shidden=[\"'](?:1|true)[\"'])[^>]*?\sr=[\"']([0-9]{1,7})[\"']"
 )
+_COLUMNS = re.compile(rb"<(?:\w+:)?col\s(?=[^>]*?\bhidden=[\"'](?:1|true)[\"'])[^>]*>")
+_FROM_TO = re.compile(rb"\b(min|max)=[\"']([0-9]{1,5})[\"']")
 _LISTED = 5
 
 
@@ -32,7 +34,8 @@ def xlsx_rows(path: str | PathLike[str]) -> TextRows:
     """Rows of the first sheet that is not hidden, as text; neither empty ones nor comments.
 
     Numbers are written so that they are read back to the last bit; of a formula its last value.
-    Notes say which sheets were not read, and which rows are hidden, as by a filter: they are read.
+    Notes say which sheets were not read, and which rows and columns are hidden, as by a filter:
+    they are read.
 
     Parameters
     ----------
@@ -96,12 +99,27 @@ def _first_sheet(path: Path, content: bytes) -> TextRows:
         found.notes.append(
             f"of the workbook the sheet {printable(sheet.title)!r} was read, not {_few(others)}"
         )
-    taken = {number for number, _ in found.rows}
-    hidden = [int(row) for row in _HIDDEN.findall(packed.read(_part(sheet))) if int(row) in taken]
-    if hidden:
-        rows = f"{len(hidden)} row{'s' * (len(hidden) > 1)}"
-        found.notes.append(f"{rows} hidden in the workbook, and read: {_few(map(str, hidden))}")
+    found.notes += _hidden(packed.read(_part(sheet)), found)
     return found
+
+
+def _hidden(written: bytes, read: TextRows) -> Iterator[str]:
+    """Notes on rows and columns with something in them that are hidden in a sheet."""
+    from openpyxl.utils import get_column_letter
+
+    taken = {number for number, _ in read.rows}
+    width = max((len(row) for _, row in read.rows), default=0)
+    columns: set[int] = set()
+    for each in _COLUMNS.findall(written):
+        ends = {name: int(at) for name, at in _FROM_TO.findall(each)}
+        columns.update(range(ends.get(b"min", 1), min(ends.get(b"max", 0), width) + 1))
+    for what, names in (
+        ("row", [row.decode() for row in _HIDDEN.findall(written) if int(row) in taken]),
+        ("column", [get_column_letter(column) for column in sorted(columns)]),
+    ):
+        if names:
+            count = f"{len(names)} {what}{'s' * (len(names) > 1)}"
+            yield f"{count} hidden in the workbook, and read: {_few(names)}"
 
 
 def _part(sheet: Any) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,6 +18,7 @@ from pkmcal.estimation.uncertainty import Uncertainty
 from pkmcal.exceptions import ArgumentError
 from pkmcal.fitted.later import Later
 from pkmcal.geometry.stated_uncertainty import StatedUncertainty
+from pkmcal.statistics.score_test import Columns
 
 _LEAST_NOISE = 0.25  # of the residuals' variance, that is noise whatever numbers are considered
 
@@ -30,16 +31,20 @@ class HeldNumbers:
     ----------
     names, units : tuple of str, k
         The numbers.
-    columns : ndarray (M, k)
-        Derivative of the whitened predicted values by them, mm, rad and 1.
+    columns : Columns
+        Derivatives of the whitened predicted values by them, mm, rad and 1.
     spread : ndarray (k, k)
         Their stated covariance.
     """
 
     names: tuple[str, ...]
     units: tuple[str, ...]
-    columns: FloatArray
+    columns: Columns
     spread: FloatArray
+
+    def matrix(self) -> FloatArray:
+        """All columns, (M, k)."""
+        return np.concatenate([some for _, some in self.columns()])
 
 
 def held_numbers(
@@ -65,10 +70,14 @@ def held_numbers(
     if wide is None:
         return None
     sets, more = wide
-    equations = Equations.of(sets, more).reweighted(fitted.whitening.deviations)
-    evaluation = equations.at(theta_of(more, chosen, end.theta), near=end.states)
     new = [i for i, name in enumerate(more.names) if name not in chosen.names]
-    columns = equations.by_parameters(evaluation, sure.factors)[:, new]
+
+    def columns() -> Iterator[tuple[slice, FloatArray]]:
+        equations = Equations.of(sets, more).reweighted(fitted.whitening.deviations)
+        evaluation = equations.at(theta_of(more, chosen, end.theta), near=end.states)
+        for _, rows, some in equations.batches(evaluation, sure.factors):
+            yield rows, some[:, new]
+
     mine = np.isin(np.flatnonzero(more.uncertain), new)
     return HeldNumbers(
         tuple(more.names[i] for i in new),
@@ -102,7 +111,7 @@ def with_considered(sure: Uncertainty, end: Evaluation, stated: StatedUncertaint
     held = held_numbers(sure, end, StatedUncertainty(stated.consider))
     if held is None:
         return sure
-    columns = held.columns @ np.linalg.cholesky(held.spread)
+    columns = held.matrix() @ np.linalg.cholesky(held.spread)
     follow = sure.fit.design.T @ columns
     left = float(((columns - sure.fit.design @ follow) ** 2).sum())
     share = max(1.0 - left / sure.fit.squares, _LEAST_NOISE)

@@ -124,7 +124,6 @@ def points(
 ) -> Points:
     """The equations at the solution."""
     present, arcs = equations.whitening.present, equations.arcs
-    by_actuators = after.machines.actuator_twists(after.states)
     variances, added, families, per_mm = [], [], [], []
     seen = equations.prediction.predicted(after)
     for i, measured in enumerate(equations.table.sets):
@@ -135,7 +134,9 @@ def points(
         families.append(np.tile(np.array([there for _, there in family], dtype=np.intp), count))
         per_mm.append(np.tile(arcs[i], count))
         sigma = _of_actuators(measured, after.robot, uncertainty)
-        moved = seen[i].by_twist @ by_actuators[equations.table.pose_of[i]]
+        moved = seen[i].by_twist @ after.machines.actuator_twists(
+            after.states, equations.table.pose_of[i]
+        )
         part = (
             np.zeros((count, k)) if sigma is None else ((moved * sigma[:, None]) ** 2).sum(axis=2)
         )

@@ -20,6 +20,7 @@ from pkmcal.estimation.parameters import Parameters
 from pkmcal.fitted.fit import Fit
 from pkmcal.statistics.leave_out import leave_out
 from pkmcal.statistics.linear_fit import numbered
+from pkmcal.statistics.score_test import Columns, columns_of
 
 LEAST_GAIN = 0.05  # share of the rms at poses left out that an effect must take away
 LEAST_T = 2.0  # of the paired differences by pose
@@ -115,6 +116,22 @@ def compared_by_poses(
     missed = plain.missed, whole.missed, whole.missed + added
     lengths = [_squares(fit, each, pose) for each in missed]
     return _comparison(lengths, beside, chosen, fit)
+
+
+def effect_columns(fit: Fit, effects: Sequence[Effect | Changed]) -> Columns | None:
+    """Derivative of the whitened predicted values by numbers of effects that the fit lacks.
+
+    None where poses have unknowns, or the fit has these numbers.
+    """
+    sure = fit.uncertainty
+    if sure.mixed:
+        return None
+    equations, end = _with_effects(fit, effects)
+    chosen, fitted = equations.parameters, {*fit.parameters.names}
+    new = [i for i, name in enumerate(chosen.names) if name not in fitted]
+    if not new:
+        return None
+    return columns_of(equations.by_parameters(end, sure.factors)[:, new])
 
 
 def _squares(fit: Fit, missed: FloatArray, pose: np.ndarray) -> FloatArray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,6 +57,11 @@ class Load:
     def of_rows(cls, rows: FloatArray) -> Load:
         """The load of numbers (..., 10) in the order of `CARRIED`."""
         return cls(rows[..., 0], rows[..., 1:4], rows[..., 4:7], rows[..., 7:10])
+
+    @classmethod
+    def stated(cls, numbers: Mapping[str, float]) -> Load:
+        """The payload among the numbers of a geometry; nothing where none is stated."""
+        return cls.of_rows(np.array([numbers.get(f"payload.{name}", 0.0) for name in CARRIED]))
 
     def rows(self, shape: tuple[int, ...] | None) -> FloatArray:
         """The numbers in the order of `CARRIED`, (10,), or (N, 10) for a batch of this shape.

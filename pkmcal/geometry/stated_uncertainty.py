@@ -8,21 +8,31 @@ the same amount; under ``consider`` they are not fitted along.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
-from typing import Any
+from typing import Any, Protocol
 
 from pkmcal.arguments import number, shown
 from pkmcal.arrays import Unit
+from pkmcal.core.library import POSE
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.files.toml_table import Table
-from pkmcal.geometry.geometry import Geometry
 
 COMMON, CONSIDER, SCALE = "common", "consider", "scale"
+LEAST, MOST = 1e-15, 1e15  # mm, rad or 1, of what a standard deviation may be
 Uncertain = Mapping[str, float | Mapping[str, float]] | None
 _BESIDE = re.compile(r"(frame|target|anchor|attachment|tool|mounting)[^@]*(@.*)?|scale")
-_ANGLES = (".alpha", ".beta", ".gamma")
+_QUANTITIES = {"mm": "lengths", "rad": "angles", "1": "ratios"}
+_UNITS_BESIDE = (
+    {  # of what is no number of the geometry; all other points are lengths
+        f"{of}.{axis}": unit
+        for of, axes in {"frame": POSE, "tool": POSE, "mounting": POSE[3:]}.items()
+        for axis, unit in zip(POSE, ("mm",) * 3 + ("rad",) * 3, strict=True)
+        if axis in axes
+    }
+    | {SCALE: "1"}
+)
 
 
 @dataclass(frozen=True)
@@ -89,7 +99,7 @@ def stated_uncertainty(given: Uncertain, argument: str = "uncertainty") -> State
         inner = _entries(f"{argument} {name}", value) if beside else [(name, value)]
         for pattern, sigma in inner:
             of = parts[name if beside else ""]
-            of[pattern] = number(f"{argument} of {pattern}", sigma, least=0.0)
+            of[pattern] = _deviation(f"{argument} of {pattern}", sigma)
     return StatedUncertainty(parts[""], parts[COMMON], parts[CONSIDER])
 
 
@@ -100,6 +110,14 @@ def _entries(argument: str, given: object) -> Iterable[tuple[str, Any]]:
             f" {shown(given)}"
         )
     return given.items()
+
+
+def _deviation(name: str, given: object) -> float:
+    """A standard deviation: 0 of what is exact, else one whose square the equations can hold."""
+    sigma = number(name, given, least=0.0)
+    if sigma and not LEAST <= sigma <= MOST:
+        raise ArgumentError(f"{name} must be 0 or from {LEAST:g} to {MOST:g}, found {sigma:g}")
+    return sigma
 
 
 def _behind(first: Mapping[str, float], later: Mapping[str, float]) -> dict[str, float]:
@@ -119,23 +137,36 @@ def unit_of(pattern: str, names: Mapping[str, str]) -> str:
     ValueError
         Lengths, angles and ratios together.
     """
-    units = {unit for name, unit in names.items() if fnmatchcase(name, pattern)}
-    if not units:
-        if pattern == SCALE:
-            return "1"
-        whole = pattern.rstrip("*").rstrip(".") in ("frame", "tool")
-        if whole:
-            units = {"mm", "rad"}
-        elif pattern.endswith(_ANGLES) or pattern.startswith("mounting"):
-            units = {"rad"}
-        else:
-            units = {"mm"}
-    if len(units) > 1:
-        raise ArgumentError(f"{pattern} covers lengths, angles or ratios together; name them apart")
-    return units.pop()
+    number = pattern.partition("@")[0]  # of whatever session
+    for known in (names, _UNITS_BESIDE):
+        covered: dict[str, list[str]] = {}
+        for name, unit in known.items():
+            if fnmatchcase(name, number):
+                covered.setdefault(unit, []).append(name)
+        if len(covered) > 1:
+            parts = [
+                f"{_QUANTITIES[unit]} ({', '.join(own[:3])}{', …' if own[3:] else ''})"
+                for unit, own in covered.items()
+            ]
+            raise ArgumentError(f"{pattern} covers {' and '.join(parts)}: name each of these apart")
+        if covered:
+            return next(iter(covered))
+    return "mm"
 
 
-def read_uncertainty(table: Table, geometry: Geometry) -> StatedUncertainty:
+class _Named(Protocol):
+    """Numbers that a statement may be about, of a parallel machine or an arm."""
+
+    @property
+    def names(self) -> Sequence[str]: ...
+
+    @property
+    def units(self) -> Sequence[str]: ...
+
+    def match(self, patterns: str, /) -> list[str]: ...
+
+
+def read_uncertainty(table: Table, geometry: _Named) -> StatedUncertainty:
     """The table ``[uncertainty]`` of a robot file, in mm and rad."""
     units = dict(zip(geometry.names, geometry.units, strict=True))
     parts = {
@@ -161,7 +192,8 @@ def _deviations(table: Table, units: Mapping[str, str]) -> dict[str, float]:
         except ValueError as error:
             table.fail("", str(error), at=name)
         sigma = table.as_number(name, value, unit)
-        if sigma < 0.0:
-            table.fail("", f"{name}: a standard deviation is not negative", at=name)
-        found[name] = sigma
+        try:
+            found[name] = _deviation(name, sigma)
+        except ValueError as error:
+            table.fail("", str(error), at=name)
     return found

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from fnmatch import fnmatchcase
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pkmcal.arguments import did_you_mean, instance, words
+from pkmcal.arguments import instance
 from pkmcal.arms.arm import SerialArm
-from pkmcal.arms.inputs import ERRORS
+from pkmcal.arms.arm_geometry import arm_geometry
 from pkmcal.arrays import BoolArray, FloatArray, Int32Array, as_rows
 from pkmcal.core import screws
-from pkmcal.exceptions import ArgumentError
+from pkmcal.geometry.carried import Load
 from pkmcal.geometry.stated_uncertainty import NOTHING, StatedUncertainty
 from pkmcal.kinematics.robot import Robot
 
@@ -111,6 +110,10 @@ class Calibratable(Protocol):
     def model(self) -> FreeByDefault:
         """What its file declares."""
 
+    @property
+    def yields(self) -> bool:
+        """Whether something of it follows what it carries."""
+
     def replace(self, changes: FloatArray) -> Calibratable:
         """A machine with other numbers (p,), checked as those of a file are."""
 
@@ -128,40 +131,6 @@ class Calibratable(Protocol):
 
     def commanded(self, places: ArrayLike) -> tuple[FloatArray, FloatArray, tuple[int, ...]]:
         """Poses (N, 6), actuator coordinates (N, n) and batch shape of what a user commands."""
-
-
-@dataclass(frozen=True, eq=False)
-class ArmGeometry:
-    """The numbers of an arm by name: joint errors, ``joint1.dx`` … ``joint6.dpsi``, then laws.
-
-    Attributes
-    ----------
-    names, units : tuple of str, p
-    values : ndarray (p,)
-        mm and rad.
-    """
-
-    names: tuple[str, ...]
-    units: tuple[str, ...]
-    values: FloatArray
-
-    def match(self, patterns: str | Iterable[str], argument: str = "") -> list[str]:
-        """Find names and wildcards, each name once, in the order of the patterns.
-
-        Raises
-        ------
-        ValueError
-            A pattern that matches nothing.
-        """
-        found: dict[str, None] = {}
-        for pattern in words(argument or "patterns", patterns):
-            hits = [name for name in self.names if fnmatchcase(name, pattern)]
-            if not hits:
-                known = did_you_mean(pattern, self.names)
-                lead = f"{argument}: " if argument else ""
-                raise ArgumentError(f"{lead}no number of the arm matches {pattern!r}{known}")
-            found.update(dict.fromkeys(hits))
-        return list(found)
 
 
 @dataclass(frozen=True)
@@ -199,16 +168,14 @@ class ArmMachine:
         self.name, self.length = arm.name, arm.length
         self.n_actuators, self.actuator_units = arm.n_joints, arm.actuator_units
         self.joint_names = arm.joint_names
-        joints = range(1, arm.n_joints + 1)
-        names = tuple(f"joint{i}.{error}" for i in joints for error in ERRORS)
-        units = ("mm", "mm", "mm", "rad", "rad", "rad") * arm.n_joints
-        values = arm.joint_errors.reshape(-1)
-        self.model = ArmModel(names)
-        if arm.laws is not None:
-            names, units = names + arm.laws.names, units + arm.laws.units
-            values = np.concatenate([values, arm.laws.values])
-        self.geometry = ArmGeometry(names, units, values)
+        self.geometry = arm_geometry(arm.joint_errors, arm.laws)
+        self.model = ArmModel(self.geometry.names[: 6 * arm.n_joints], arm.uncertainty)
         self.home = screws.pose(arm.home.reshape(1, 16))[0]
+
+    @property
+    def yields(self) -> bool:
+        """Whether a joint follows what the tool carries."""
+        return self.arm.laws is not None and self.arm.laws.yielding
 
     def replace(self, changes: FloatArray) -> ArmMachine:
         """With other joint errors (6 n,) and numbers of its joints' laws, mm and rad."""
@@ -221,6 +188,10 @@ class ArmMachine:
     def approaching(self, approach: FloatArray) -> ArmMachine:
         """With joints that come from there (N, n)."""
         return ArmMachine(self.arm.approaching(approach))
+
+    def under(self, load: Load) -> ArmMachine:
+        """With what the tool carries, one for all rows or one each."""
+        return ArmMachine(self.arm.under(load))
 
     def with_values(self, values: FloatArray) -> ArmMachine:
         """The same as `replace`, which is quick here."""

@@ -19,7 +19,7 @@ from pkmcal.core.path_differences import along_path
 from pkmcal.core.poses import rates_of_twists
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.frames import Frames
-from pkmcal.kinematics.loaded import AnyCompiled
+from pkmcal.kinematics.loaded import AnyCompiled, LoadedMachine
 from pkmcal.screw import from_pose
 
 ITERATIONS = 30
@@ -328,7 +328,8 @@ def completed_rates(
         Velocity and acceleration of the matched coordinates, by time.
     """
     free = [POSE.index(name) for name in MAPS[map]]
-    if machine.rows > len(free):  # closures that depend cannot be solved for rates, one by one
+    # closures that depend cannot be solved for rates, one by one, nor those that loads move
+    if machine.rows > len(free) or isinstance(machine, LoadedMachine):
         scale = np.where(np.array(matched) < 3, 1.0 / machine.struct.size, 1.0)
 
         def completed(change: FloatArray) -> FloatArray:

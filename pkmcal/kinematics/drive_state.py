@@ -37,12 +37,12 @@ class DriveState(NamedTuple):
         return DriveState(*(None if each is None else each[rows] for each in self))
 
     def of(self, machine: M) -> M:
-        """The machine in this state: a robot, or an arm, on which tension and load do nothing."""
+        """The machine in this state: a robot, or an arm, on which tension does nothing."""
         found: Any = machine
         if isinstance(found, Robot | ArmMachine) and self.approach is not None:
             found = found.approaching(self.approach)
         if isinstance(found, Robot) and self.tension is not None:
             found = found.tensioned(self.tension)
-        if isinstance(found, Robot) and self.load is not None and found.rigid is not found:
+        if isinstance(found, Robot | ArmMachine) and self.load is not None and found.yields:
             found = found.under(Load.of_rows(self.load))
         return cast(M, found)

@@ -269,7 +269,8 @@ class Kinematics:
         instance("load", load, Load)
         if not isinstance(self.machine, LoadedMachine):
             raise ArgumentError(
-                f"load: nothing of {self.model.name} yields: state stiffness or [compliance]"
+                f"load: nothing of {self.model.name} yields: state stiffness or [compliance] in its"
+                " file, or take robot.yielding({'offset*': 5e-5})"
             )
         other = copy(self)
         other.machine = self.machine.carrying(load.rows(None))

@@ -258,8 +258,11 @@ class LoadedMachine(RestingMachine):
         return self.inner.limbs(self.under_load(slots, pose), pose)
 
     def drives_at(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
-        """The ways q̃ (N, drives) that poses (N, 6) ask of each drive by itself; any turn."""
-        return self.inner.drives_at(self.under_load(slots, pose), pose)
+        """The ways q̃ (N, drives) that poses (N, 6) ask of the drives under the load; any turn.
+
+        Of what is commanded, as `drives` and `at_drives` are: what gives way is no way of a drive.
+        """
+        return self.drives(slots, self.inverse(slots, pose))
 
     # what the load does not change ----------------------------------------------------------------
 

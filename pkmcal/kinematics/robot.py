@@ -503,6 +503,11 @@ class Robot(Kinematics, Result):
         """The machine without what yields and what pulls at it; itself where nothing yields."""
         return self if self.model.elastic is None else Robot(self.model.rigid)
 
+    @property
+    def yields(self) -> bool:
+        """Whether something of it yields, so that it follows weights and what it carries."""
+        return self.model.elastic is not None
+
     def yielding(self, compliance: Mapping[str, float], *, per_length: bool = False) -> Robot:
         """The machine with numbers of its limbs that yield.
 

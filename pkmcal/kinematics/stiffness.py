@@ -13,7 +13,7 @@ from pkmcal.arguments import number
 from pkmcal.arrays import FloatArray, as_rows
 from pkmcal.display import Table, fixed
 from pkmcal.exceptions import ArgumentError
-from pkmcal.geometry.carried import CARRIED, Load
+from pkmcal.geometry.carried import Load
 from pkmcal.kinematics.complete import completed
 from pkmcal.kinematics.loaded import LoadedMachine
 from pkmcal.kinematics.robot import Robot, require_parallel
@@ -21,6 +21,7 @@ from pkmcal.result import Result
 from pkmcal.screw import from_pose
 
 _NONE = 1e-12  # of the largest: a compliance that is none
+_SHOWN = 1e-9  # of the geometric mean of two diagonals: a stiffness beside them that is none
 _STEPS = np.arange(1, 11) / 10.0  # of the rated load
 _WAYS = ("+x", "-x", "+y", "-y", "+z", "-z")
 
@@ -80,6 +81,19 @@ class Stiffness(Result):
         unit = rows[0] / np.linalg.norm(rows[0])
         return np.asarray(unit @ self.compliance[..., 3:, 3:] @ unit)
 
+    def stiffness_along(self, direction: ArrayLike) -> FloatArray:
+        """The force along a direction that moves the tool by 1 mm along it, N/mm, (...).
+
+        The tool is free to go aside. Infinite where it does not yield along the direction.
+
+        Parameters
+        ----------
+        direction : array_like (3,)
+            As for `along`.
+        """
+        with np.errstate(divide="ignore"):
+            return np.asarray(1.0 / np.maximum(self.along(direction), 0.0))
+
     def displacement(self, force: ArrayLike) -> FloatArray:
         """How far a force at the tool, such as that of a cut, moves it: mm, (..., 3).
 
@@ -119,7 +133,7 @@ class Stiffness(Result):
         if not known.any():
             return
         ways = {"along x": [1, 0, 0], "along y": [0, 1, 0], "along z": [0, 0, 1]}
-        found = {name: 1.0 / self.along(way)[known] for name, way in ways.items()}
+        found = {name: self.stiffness_along(way)[known] for name, way in ways.items()}
         found["softest"] = stiffness[known]
         measures = (np.min, np.median, np.max)
         yield Table(
@@ -130,6 +144,20 @@ class Stiffness(Result):
         worst = np.nanargmin(stiffness)
         x, y, z = direction.reshape(-1, 3)[worst].round(3) + 0.0
         yield f"softest along ({x:g}, {y:g}, {z:g}) of the base"
+        if known.size == 1:
+            names = [f"{what} {axis}" for what in ("moment", "force") for axis in "xyz"]
+            shown = zip(names, matrix_cells(self.matrix.reshape(6, 6)), strict=True)
+            heads = ["N mm/rad, N, N/mm", "turn x", "turn y", "turn z", "x", "y", "z"]
+            yield Table(heads, [[name, *row] for name, row in shown], left=1)
+
+
+def matrix_cells(matrix: FloatArray) -> list[list[str]]:
+    """Show the numbers of a stiffness matrix (6, 6); what is no more than rounding is 0."""
+    size = np.sqrt(np.diagonal(matrix))
+    with np.errstate(invalid="ignore"):
+        least = _SHOWN * np.outer(size, size)
+        shown = np.where(np.abs(matrix) < least, 0.0, matrix)
+    return [[f"{number:.4g}".replace("inf", "∞") for number in row] for row in shown.tolist()]
 
 
 def stiffness(
@@ -290,12 +318,10 @@ def _yielding(robot: Robot) -> Robot:
 
 def _carried(robot: Robot, load: Load | None) -> Load:
     """What a machine carries: the load, or the payload that its file states."""
-    if load is not None:
-        load.rows(())
-        return load
-    names = [f"payload.{name}" for name in CARRIED]
-    values = [dict(robot.geometry.items()).get(name, 0.0) for name in names]
-    return Load(values[0], values[1:4], values[4:7], values[7:10])
+    if load is None:
+        return Load.stated(dict(robot.geometry.items()))
+    load.rows(())
+    return load
 
 
 def _with_force(load: Load, force: FloatArray) -> Load:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from pkmcal.arrays import FloatArray, Unit
-from pkmcal.exceptions import ArgumentError
+from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.files.csv_table import Table
 from pkmcal.files.csv_writer import WrittenColumn
 from pkmcal.geometry.carried import CARRIED, Load
@@ -30,6 +30,11 @@ class CarriedLoad(Field):
     def kept(self, given: Any, m: Any) -> FloatArray:
         """A `Load`, or its numbers (10,) or (N, 10)."""
         if not isinstance(given, Load):
+            if isinstance(given, list | tuple) and any(isinstance(each, Load) for each in given):
+                raise ArgumentTypeError(
+                    "load must be one Load, found several in a list: give one Load for all rows,"
+                    " of which mass, centre, force or moment may have a value for each row"
+                )
             rows = numbers(self.name, given)
             if rows.shape[-1:] != (len(CARRIED),):
                 raise ArgumentError(

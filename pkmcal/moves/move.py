@@ -10,11 +10,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pkmcal.arguments import number, word
+from pkmcal.arguments import instance, number, word
 from pkmcal.arrays import FloatArray, as_rows
 from pkmcal.core.library import POSE
 from pkmcal.display import POSE_HEADER, Table, displayed, long_table, pose_cells
 from pkmcal.exceptions import ArgumentError
+from pkmcal.geometry.carried import Load
 from pkmcal.kinematics.complete import ON_THE_MANIFOLD, Completed, complete, completed_rates
 from pkmcal.kinematics.dexterity import dexterity
 from pkmcal.kinematics.perturbed import off
@@ -257,6 +258,7 @@ def move(
     velocity: ArrayLike | None = None,
     acceleration: ArrayLike | None = None,
     jerk: ArrayLike | None = None,
+    load: Load | None = None,
 ) -> Move:
     """A move of a machine from rest to rest between two poses.
 
@@ -280,6 +282,11 @@ def move(
     velocity, acceleration, jerk : array_like () or (n,), optional
         Limits of the actuators, mm or rad, and s; without `duration` at least one is needed. They
         hold between samples too: see Notes.
+
+    load : Load, optional
+        What a machine that yields carries all along, in place of the payload that its file states:
+        the actuators are those that hold the poses under it, as they are at rest. Ends are poses
+        under the load.
 
     Returns
     -------
@@ -315,6 +322,9 @@ def move(
     True
     """
     require_parallel(robot)
+    if load is not None:
+        instance("load", load, Load).rows(())  # one for the whole move
+        robot = robot.under(load)
     ends = [_pose(robot, "start", start), _pose(robot, "end", end)]
     word("space", space, ("pose", "coordinates", "joint"))
     word("law", law, (*_LAWS, "jerk-limited"))

@@ -14,6 +14,8 @@ from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import BoolArray, FloatArray, IntArray, as_rows, mm_per_unit
 from pkmcal.core.library import POSE
 from pkmcal.display import Table, fixed
+from pkmcal.effects.effect import Effects
+from pkmcal.effects.stated import effects_on
 from pkmcal.estimation.parameters import Parameters, Prior
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.carried import Load
@@ -186,6 +188,7 @@ def plan_poses(
     actuator_noise: ArrayLike | None = None,
     travel_weight: float = 0.0,
     payloads: Sequence[float | Load] = (),
+    effects: Effects = (),
 ) -> Plan:
     """Choose poses to measure among candidates, by exchange.
 
@@ -239,6 +242,9 @@ def plan_poses(
     payloads : sequence of float or Load
         What a machine that yields carries in turn, kg: every candidate can be measured under each,
         and the targets are to be met under each. Poses with one payload come one after another.
+    effects : sequence of effects
+        Those that are numbers of the machine, which the calibration is to find as well: `Sag`,
+        `Elasticity`, `Harmonics`, `Coupling`, `Backlash`.
 
     Returns
     -------
@@ -266,6 +272,9 @@ def plan_poses(
     """
     word("criterion", criterion, CRITERIA)
     machine = as_machine(robot)
+    machine, others, of_effects = effects_on(machine, effects)
+    if others:
+        raise ArgumentError(f"effects: {others[0].name} follows rows, which a plan has not yet")
     loads = stated_loads(machine, payloads)
     counts = _counts(kind, count, accuracy)
     kinds = list(counts)
@@ -279,7 +288,7 @@ def plan_poses(
                 actuator_noise, load)
         for each in kinds for load in loads
     ]  # fmt: skip
-    equations = equations_of(machine, sets, free, prior, unknown)
+    equations = equations_of(machine, sets, free, prior, unknown, of_effects)
     parameters = equations[0].parameters
     safe = _safe(parameters, poses, q)
     rows = place.reshape(-1)[safe]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Literal
 
@@ -20,7 +20,7 @@ from pkmcal.estimation.starts import with_starts
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.geometry.carried import Load
 from pkmcal.kinematics import pose_steps
-from pkmcal.kinematics.calibratable import Calibratable
+from pkmcal.kinematics.calibratable import ArmMachine, Calibratable
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.tracker import Tracker
@@ -110,7 +110,13 @@ def stated_loads(robot: Calibratable, payloads: Sequence[float | Load]) -> list[
     found = [each if isinstance(each, Load) else Load(mass=each) for each in payloads]
     for each in found:
         each.rows(())
-        under(robot, each)  # refuses a machine of which nothing yields
+        if not robot.yields:
+            what = "joint*" if isinstance(robot, ArmMachine) else "offset*"
+            raise ArgumentError(
+                f"payloads: nothing of {robot.name} yields: plan with effects="
+                f"[pk.Elasticity('{what}')], --effects 'elasticity={what}', state stiffness in its"
+                " file, or give robot.yielding(…)"
+            )
     return [*found] or [None]
 
 
@@ -118,8 +124,7 @@ def under(robot: Calibratable, load: Load | None) -> Calibratable:
     """The machine with what it is to carry."""
     if load is None:
         return robot
-    if not isinstance(robot, Robot):
-        raise ArgumentError(f"payloads: {robot.name} is an arm, which has no limbs that yield")
+    assert isinstance(robot, Robot | ArmMachine)
     return robot.under(load)
 
 
@@ -129,8 +134,12 @@ def equations_of(
     free: str | Sequence[str] | None,
     prior: Prior,
     unknown: str | Sequence[str],
+    of_effects: Mapping[str, float],
 ) -> list[Equations]:
-    """The equations that each set has in the calibration to come of all."""
+    """The equations that each set has in the calibration to come of all.
+
+    `of_effects` are numbers that effects free beside, with deviations of what is known of each.
+    """
     roles = words("unknown", unknown)
     for each in roles:
         word("unknown", each, UNKNOWN)
@@ -139,7 +148,7 @@ def equations_of(
         for measured in sets
     ]
     datasets = with_starts(robot, datasets)
-    chosen = parameters(robot, datasets, Asked(free, prior))
+    chosen = parameters(robot, datasets, Asked(free, prior, of_effects=of_effects))
     return [Equations.of([data], chosen) for data in datasets]
 
 

@@ -17,15 +17,12 @@ from pkmcal.estimation import misfits
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.kinematics.calibratable import as_machine
-from pkmcal.kinematics.robot import Robot
-from pkmcal.kinematics.workspace import reach, sample_poses, workspace
 from pkmcal.measurements.iso9283 import performance
 from pkmcal.measurements.repeats import groups
+from pkmcal.report.places import Places
 
 _WORST = 10  # rows that are listed
 _ALIKE = 1e-6  # mm by which distances differ that are not equal
-_CELLS, _DRAWN = 30, 500  # of the map of the workspace along an axis; of poses for its quantiles
-_SHARE = 0.9  # of the way from home to the ends of the workspace
 _MOSTLY, _ONLY = 0.5, 0.99  # of the prior's deviation, above which the prior dominates
 _ELSEWHERE = 1.0  # mm: a pose so far from the desired one is of another assembly mode
 _NEGLIGIBLE = 1e-3  # share of a parameter in unidentifiable combinations
@@ -289,35 +286,16 @@ def held_out_numbers(found: Identification) -> list[dict[str, Any]]:
     ]
 
 
-def over_the_workspace(found: Identification) -> tuple[WorkspaceAccuracy, Slice | None] | str:
-    """Predict the accuracy over the workspace from the covariance, or say why that fails."""
-    machine = found.robot
-    if isinstance(machine, SerialArm):
-        q = found.fit.equations.table.actuators
-        shape = (_DRAWN, q.shape[1])
-        random = np.random.default_rng(0).uniform(q.min(axis=0), q.max(axis=0), shape)
-        positions = as_machine(machine).forward(random).pose[:, :3]
-        where = f"{_DRAWN} joint positions drawn within the range that was measured"
-        return WorkspaceAccuracy(random, positions, expected(found, random), where), None
-    where = f"{_DRAWN} poses drawn in the workspace, {100 * _SHARE:.0f} % of the way to its ends"
-    if _endless(machine):
-        machine = machine.within(_measured_box(found, machine))
-        where = f"{_DRAWN} poses drawn between those that were measured, for no strokes are stated"
-    try:
-        poses = sample_poses(machine, _DRAWN, share=_SHARE)
-        ends = reach(machine)
-    except ValueError as error:
-        return str(error)
-    sampled = WorkspaceAccuracy(poses, poses[:, :3], expected(found, poses), where)
-    axes = [name for name in ends if name in "xyz" and ends[name][0] < ends[name][1]][:2]
-    if len(axes) < 2:
+def over_the_workspace(
+    found: Identification, places: Places
+) -> tuple[WorkspaceAccuracy, Slice | None]:
+    """Predict the accuracy over the workspace from the covariance."""
+    accuracy = expected(found, places.poses)
+    sampled = WorkspaceAccuracy(places.poses, places.positions, accuracy, places.where)
+    if places.area is None:
         return sampled, None
-    grid = workspace(machine, {name: (*ends[name], _CELLS) for name in axes})
-    inside = grid.inside
-    accuracy = np.full(inside.shape, np.nan)
-    accuracy[inside] = expected(found, grid.poses[inside])
-    accuracy[~np.isfinite(accuracy)] = np.nan
-    return sampled, Slice((axes[0], axes[1]), (grid.values[0], grid.values[1]), accuracy)
+    area = places.area
+    return sampled, Slice(area.axes, area.values, area.filled(expected(found, area.poses)))
 
 
 def over_the_measured(found: Identification) -> FloatArray:
@@ -325,24 +303,6 @@ def over_the_measured(found: Identification) -> FloatArray:
     end = found.fit.end
     predicted = expected(found, end.actuators if isinstance(found.robot, SerialArm) else end.pose)
     return predicted[np.isfinite(predicted)]
-
-
-def _endless(robot: Robot) -> bool:
-    """Whether nothing says how far legs, cables or carriages go: a workspace may be anywhere."""
-    return not robot.model.workspace and any(
-        drive.stroke is None and not drive.angle for drive in robot.model.drives
-    )
-
-
-def _measured_box(found: Identification, robot: Robot) -> dict[str, tuple[float, float]]:
-    """Ends of the measured positions, with home, along each coordinate that the robot moves."""
-    poses = np.vstack([found.fit.end.pose, robot.home])
-    poses = poses[np.isfinite(poses).all(axis=1)]
-    return {
-        name: (float(poses[:, k].min()), float(poses[:, k].max()))
-        for k, name in enumerate(POSE[:3])
-        if name in robot.moved
-    }
 
 
 def _largest(values: FloatArray) -> float:

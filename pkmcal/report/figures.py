@@ -21,6 +21,7 @@ from pkmcal.report.drawing import (
     sample,
 )
 from pkmcal.report.exaggerated import middle_exaggerated
+from pkmcal.report.yielding import Yielding
 from pkmcal.view.plot import lines, widen
 
 if TYPE_CHECKING:
@@ -148,13 +149,8 @@ def accuracy(sampled: WorkspaceAccuracy, area: Slice | None) -> Figure:
     figure = empty_figure(_WIDTH, 3.8)
     left, right = figure.subplots(1, 2)
     if area is not None and np.isfinite(area.accuracy).any():
-        first, second = area.values
-        filled = left.pcolormesh(
-            first, second, area.accuracy.T, cmap="viridis", rasterized=True, shading="nearest"
-        )
-        figure.colorbar(filled, ax=left)
-        left.set(xlabel=f"{area.axes[0]} [mm]", ylabel=f"{area.axes[1]} [mm]")
-        left.set_title("one standard deviation [mm], slice through home", fontsize="medium")
+        title = "one standard deviation [mm], slice through home"
+        _map(left, area.axes, area.values, area.accuracy, title)
     else:
         finite = np.isfinite(sampled.accuracy)
         x, y = sampled.positions[finite, :2].T
@@ -162,15 +158,46 @@ def accuracy(sampled: WorkspaceAccuracy, area: Slice | None) -> Figure:
         figure.colorbar(marks, ax=left)
         left.set(xlabel="x [mm]", ylabel="y [mm]")
         left.set_title("one standard deviation [mm], poses from above", fontsize="medium")
-    errors = np.sort(sampled.predicted)
-    share = 100 * (np.arange(len(errors)) + 0.5) / len(sampled.accuracy)
-    right.plot(share, errors, color=BLUE)
-    right.set(
-        xlabel="cumulative share of poses [%]", ylabel="one standard deviation [mm]", xlim=(0, 100)
-    )
-    right.set_ylim(bottom=0)
-    _grid(right)
+    _shares(right, sampled.predicted, len(sampled.accuracy), "one standard deviation [mm]")
     return figure
+
+
+@in_context
+def stiffness(found: Yielding) -> Figure:
+    """Draw the stiffness along the softest direction: over a slice, and over the poses drawn."""
+    assert found.map is not None
+    figure = empty_figure(_WIDTH, 3.8)
+    left, right = figure.subplots(1, 2)
+    title = "softest direction [N/mm], slice through home"
+    _map(left, found.map.axes, found.map.values, found.map.softest, title)
+    _shares(right, found.softest, len(found.softest), "along the softest direction [N/mm]")
+    return figure
+
+
+def _map(
+    panel: Axes,
+    axes: tuple[str, str],
+    values: tuple[FloatArray, FloatArray],
+    shown: FloatArray,
+    title: str,
+) -> None:
+    """Colour a slice of the workspace by a number."""
+    first, second = values
+    filled = panel.pcolormesh(
+        first, second, shown.T, cmap="viridis", rasterized=True, shading="nearest"
+    )
+    panel.figure.colorbar(filled, ax=panel)
+    panel.set(xlabel=f"{axes[0]} [mm]", ylabel=f"{axes[1]} [mm]")
+    panel.set_title(title, fontsize="medium")
+
+
+def _shares(panel: Axes, values: FloatArray, count: int, label: str) -> None:
+    """Draw numbers over the cumulative share of so many poses."""
+    share = 100 * (np.arange(len(values)) + 0.5) / count
+    panel.plot(share, np.sort(values), color=BLUE)
+    panel.set(xlabel="cumulative share of poses [%]", ylabel=label, xlim=(0, 100))
+    panel.set_ylim(bottom=0)
+    _grid(panel)
 
 
 @in_context

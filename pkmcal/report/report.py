@@ -17,10 +17,11 @@ from pkmcal.effects.expansion import in_words
 from pkmcal.files.atomic import write_whole
 from pkmcal.files.provenance import checksums, comment, version
 from pkmcal.fitted.row_names import row_names
-from pkmcal.report import certificate, contents, machine_view, pdf
+from pkmcal.report import certificate, contents, machine_view, pdf, yielding
 from pkmcal.report.as_json import as_json
 from pkmcal.report.axes import axes
 from pkmcal.report.certificate import Statement
+from pkmcal.report.places import in_the_workspace
 from pkmcal.view import page
 
 if TYPE_CHECKING:
@@ -82,16 +83,20 @@ def gather(
     """Collect everything that the report says; the calibration itself is ``found``."""
     state, sentence = contents.verdict(found)
     points = contents.points(found)
-    predicted = contents.over_the_workspace(found)
-    accuracy = None if isinstance(predicted, str) else predicted[0]
+    places = in_the_workspace(found)
+    no_places, accuracy, area = "", None, None
+    if isinstance(places, str):
+        no_places = places
+    else:
+        accuracy, area = contents.over_the_workspace(found, places)
     signed = None
     if stated is not None:
-        sure, places, region, unsure = np.empty(0), np.empty((0, 3)), "", 0
+        sure, at, region, unsure = np.empty(0), np.empty((0, 3)), "", 0
         if accuracy is not None:
-            sure, places = accuracy.predicted, accuracy.positions[np.isfinite(accuracy.accuracy)]
+            sure, at = accuracy.predicted, accuracy.positions[np.isfinite(accuracy.accuracy)]
             region, unsure = accuracy.where, len(accuracy.accuracy) - len(sure)
         measured = contents.over_the_measured(found)
-        signed = certificate.as_data(found, stated, sure, places, region, measured, unsure)
+        signed = certificate.as_data(found, stated, sure, at, region, measured, unsure)
     return {
         "state": state,
         "verdict": sentence,
@@ -112,8 +117,9 @@ def gather(
             found.fit.equations.table.sets, found.expansion, found.fit.parameters.robot
         ),
         "accuracy": accuracy,
-        "slice": None if isinstance(predicted, str) else predicted[1],
-        "no_accuracy": predicted if isinstance(predicted, str) else "",
+        "slice": area,
+        "no_accuracy": no_places,
+        "stiffness": yielding.of(found.robot, None if isinstance(places, str) else places),
         "inputs": checksums(files),
         "instrument_sought": contents.instrument_identified(found),
         "arm": isinstance(found.robot, SerialArm),
@@ -192,6 +198,11 @@ def _figures(facts: Mapping[str, Any]) -> dict[str, str]:
         wanted["accuracy"] = (
             lambda: figures.accuracy(facts["accuracy"], facts["slice"]),
             "Expected accuracy over the workspace",
+        )
+    if facts["stiffness"] is not None and facts["stiffness"].map is not None:
+        wanted["stiffness"] = (
+            lambda: figures.stiffness(facts["stiffness"]),
+            "Stiffness over the workspace",
         )
     for k, score in enumerate(facts["iso9283"]):
         wanted[f"iso{k}"] = (lambda score=score: figures.poses(score), "Accuracy of each pose")  # type: ignore[misc]

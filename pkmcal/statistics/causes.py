@@ -11,12 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray
-from pkmcal.statistics.distributions import f_tail
 from pkmcal.statistics.linear_fit import LinearFit
-from pkmcal.statistics.score_test import Score, score_test
-
-_SAME = 1e-6  # share of a column that must be left beside the parameters
+from pkmcal.statistics.score_test import Beside, Columns, Score, beside
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,100 +40,73 @@ class Explained:
     also: tuple[int, ...]
 
 
-def causes(
-    fit: LinearFit, columns: Sequence[FloatArray], chance: float, most: int
-) -> list[Explained]:
+def causes(fit: LinearFit, columns: Sequence[Columns], chance: float, most: int) -> list[Explained]:
     """Search forward for causes, at most `most`, each by chance less than `chance` in all.
 
     Parameters
     ----------
     fit : LinearFit
         The fit.
-    columns : sequence of ndarray (M, d)
-        Of each cause; whitened derivatives of the predicted values.
+    columns : sequence of Columns
+        Of each cause; those that are all 0 do not count.
     """
     found: list[Explained] = []
-    limit, left = chance / max(len(columns), 1), dict(enumerate(columns))
+    begun = ((k, beside(fit, own)) for k, own in enumerate(columns))
+    left = {k: each for k, each in begun if each is not None}
+    count = len(left)
+    limit = chance / max(count, 1)
     while left and len(found) < most:
-        scores = {k: _tested(fit, own, limit) for k, own in left.items()}
-        known = {k: each for k, each in scores.items() if each is not None and each.chance < limit}
+        scores = {k: _sure(each, limit) for k, each in left.items()}
+        known = {k: each for k, each in scores.items() if each is not None}
         if not known:
             break
         best = min(known, key=lambda k: (known[k].chance, -known[k].drop))
         score, taken = known[best], left.pop(best)
-        after = _with(fit, taken, score)
-        also = [k for k in known if k != best and not _sure(_tested(after, left[k], limit), limit)]
+        after = _with(taken, score)
+        tested = {k: beside(after, each.columns) for k, each in left.items()}
+        also = [k for k in known if k != best and _sure(tested[k], limit) is None]
         found.append(
             Explained(
                 best,
-                min(1.0, score.chance * len(columns)),
+                min(1.0, score.chance * count),
                 1.0 - float(np.sqrt(max(1.0 - score.drop / fit.squares, 0.0))),
-                _shift(fit, taken, score),
+                _shift(taken, score),
                 tuple(also),
             )
         )
         fit = after
-        for k in also:
-            del left[k]
+        left = {k: each for k, each in tested.items() if each is not None and k not in also}
     return found
 
 
-def _sure(score: Score | None, limit: float) -> bool:
-    return score is not None and score.chance < limit
+def _sure(tested: Beside | None, limit: float) -> Score | None:
+    """The score of columns that explain more than chance does.
 
-
-def _unit(columns: FloatArray) -> FloatArray:
-    """Columns (M, d) of length 1, without those that are nothing."""
-    size = np.linalg.norm(columns, axis=0)
-    unit: FloatArray = columns[:, size > 0.0] / size[size > 0.0]
-    return unit
-
-
-def _beside(fit: LinearFit, unit: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Combinations (d, k) of columns that the parameters cannot take up, of length 1 beside them.
-
-    And how the basis of the fit follows the columns, (p, d).
+    Where as much would be likely if equations of a pose shared nothing nothing else is asked: that
+    is quick; and shared errors make as much more likely.
     """
-    by_basis = fit.design.T @ unit
-    values, ways = np.linalg.eigh(unit.T @ unit - by_basis.T @ by_basis)
-    new = values > _SAME
-    return ways[:, new] / np.sqrt(values[new]), by_basis
-
-
-def _tested(fit: LinearFit, columns: FloatArray, limit: float) -> Score | None:
-    """The score test, where as much would be unlikely if equations of a pose shared nothing.
-
-    That is quick; and shared errors make as much more likely.
-    """
-    unit = _unit(columns)
-    half, _ = _beside(fit, unit)
-    k, along = half.shape[1], half.T @ (unit.T @ fit.residual)
-    drop, rest = float(along @ along), fit.freedom - half.shape[1]
-    if not k or rest < 1.0:
+    if tested is None or tested.chance >= limit:
         return None
-    over = max(fit.squares - drop, 0.0) / rest
-    if not over > 0.0 or f_tail(min(drop / k / over, 1e300), k, rest) >= limit:
-        return None
-    return score_test(fit, unit)
+    score = tested.score()
+    return score if score is not None and score.chance < limit else None
 
 
-def _with(fit: LinearFit, columns: FloatArray, score: Score) -> LinearFit:
+def _with(taken: Beside, score: Score) -> LinearFit:
     """The fit with the columns of a cause among its parameters."""
-    unit = _unit(columns)
-    half, by_basis = _beside(fit, unit)
-    own = (unit - fit.design @ by_basis) @ half
+    fit, turned = taken.fit, taken.by_basis @ taken.half
     return replace(
         fit,
-        design=np.hstack([fit.design, own]),
+        design=np.hstack([fit.design, taken.own]),
         residual=fit.residual - score.explained,
-        prior=np.hstack([fit.prior, -fit.prior @ by_basis @ half]),
-        back=np.hstack([fit.back, -fit.back @ by_basis @ half]),
+        prior=np.hstack([fit.prior, -fit.prior @ turned]),
+        back=np.hstack([fit.back, -fit.back @ turned]),
     )
 
 
-def _shift(fit: LinearFit, columns: FloatArray, score: Score) -> float:
+def _shift(taken: Beside, score: Score) -> float:
     """How far a cause moves the parameters, in standard deviations by what it leaves, rms."""
-    moved = fit.back @ (fit.design.T @ _unit(columns) @ score.size)
+    fit = taken.fit
+    moved = fit.back @ (taken.by_basis @ score.size)
     noise = np.sqrt(max(fit.squares - score.drop, 0.0) / max(fit.freedom - len(score.size), 1.0))
     deviation = noise * np.linalg.norm(fit.back, axis=1)
     known = deviation > 0.0

@@ -21,7 +21,7 @@ from functools import cached_property
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray, lots
-from pkmcal.statistics.linear_fit import LinearFit, grouped, sums
+from pkmcal.statistics.linear_fit import LinearFit, alike, grouped, sums
 
 _FEW = 4096  # equations of which what adjusts them is there at once
 _SPENT = 1e-8  # share of a residual's variance below which the fit follows it wherever it lies
@@ -65,8 +65,8 @@ def _adjusted(matrix: FloatArray, values: FloatArray, part: FloatArray) -> Float
     return found
 
 
-def _block(rows: IntArray, design: FloatArray) -> _Block:
-    part = design[rows]
+def _block(rows: IntArray, part: FloatArray) -> _Block:
+    """Of clusters of equations (g, m) whose part of the design is (g, m, p)."""
     wide = rows.shape[1] <= part.shape[2]
     inner = part @ part.transpose(0, 2, 1) if wide else part.transpose(0, 2, 1) @ part
     values, vectors = np.linalg.eigh(inner)
@@ -82,9 +82,28 @@ def _block(rows: IntArray, design: FloatArray) -> _Block:
 
 @dataclass(frozen=True, eq=False)
 class Sandwich:
-    """The cluster sandwich of a fit, adjusted for leverage."""
+    """The cluster sandwich of a fit, adjusted for leverage.
+
+    Attributes
+    ----------
+    fit : LinearFit
+        The fit.
+    beside : ndarray (M, k) or None
+        Further columns of its design, orthonormal beside it; p below counts them.
+    """
 
     fit: LinearFit
+    beside: FloatArray | None = None
+
+    @property
+    def _width(self) -> int:
+        beside = 0 if self.beside is None else self.beside.shape[1]
+        return int(self.fit.design.shape[1] + beside)
+
+    def _design(self, rows: IntArray | slice) -> FloatArray:
+        """Rows of the design."""
+        own = self.fit.design[rows]
+        return own if self.beside is None else np.concatenate([own, self.beside[rows]], axis=-1)
 
     def _blocks(self) -> Iterable[_Block]:
         """Lots of clusters of the same size; of few equations they are kept."""
@@ -95,13 +114,8 @@ class Sandwich:
         return list(self._made()) if len(self.fit.residual) <= _FEW else None
 
     def _made(self) -> Iterator[_Block]:
-        order = np.argsort(self.fit.cluster, kind="stable")
-        sizes = np.bincount(self.fit.cluster)
-        first = np.cumsum(sizes) - sizes
-        for size in np.unique(sizes[sizes > 0]).tolist():
-            alike = first[sizes == size, None] + np.arange(size)
-            for lot in lots(len(alike), max(_FEW // size, 1)):
-                yield _block(order[alike[lot]], self.fit.design)
+        for rows in alike(self.fit.cluster, _FEW):
+            yield _block(rows, self._design(rows))
 
     def adjusted(self, values: FloatArray) -> FloatArray:
         """Multiply the part of each cluster by (1 - H)^(-1/2): values (M, k).
@@ -110,7 +124,7 @@ class Sandwich:
         """
         out = np.empty_like(values)
         for rows, matrix, _ in self._blocks():
-            out[rows] = _adjusted(matrix, values[rows], self.fit.design[rows])
+            out[rows] = _adjusted(matrix, values[rows], self._design(rows))
         return out
 
     @cached_property
@@ -118,7 +132,7 @@ class Sandwich:
         left, kept = np.empty((2, len(self.fit.residual)))
         for rows, matrix, retained in self._blocks():
             mine = self.fit.residual[rows][:, :, None]
-            left[rows] = _adjusted(matrix, mine, self.fit.design[rows])[:, :, 0]
+            left[rows] = _adjusted(matrix, mine, self._design(rows))[:, :, 0]
             kept[rows] = retained
         return left, kept
 
@@ -138,9 +152,9 @@ class Sandwich:
     @cached_property
     def data(self) -> FloatArray:
         """Covariance (p, p) in the basis as far as the data's errors make it."""
-        covariance = np.zeros((self.fit.design.shape[1],) * 2)
+        covariance = np.zeros((self._width,) * 2)
         for rows in grouped(self.fit.cluster):
-            weighted = self.fit.design[rows] * self.residual[rows, None]
+            weighted = self._design(rows) * self.residual[rows, None]
             pulls = sums(weighted, self.fit.cluster[rows])
             covariance += pulls.T @ pulls
         return covariance
@@ -150,7 +164,7 @@ class Sandwich:
         k, p = contrasts.shape
         every, trace, square, inner = np.zeros(k), np.zeros(k), np.zeros(k), np.zeros((k, p, p))
         for rows, matrix, _ in self._blocks():
-            part = self.fit.design[rows]
+            part = self._design(rows)
             alpha = _adjusted(matrix, part @ contrasts.T, part)
             own = (alpha**2).sum(axis=1)
             every += own.sum(axis=0)
@@ -176,10 +190,12 @@ class Sandwich:
         size, axes = np.linalg.eigh(contrasts @ contrasts.T)
         if not size[0] > _SPENT * size[-1]:
             return 0.0
-        alpha = self.adjusted(fit.design @ (contrasts.T @ axes / np.sqrt(size)))
-        square, cross = np.zeros((k, k)), np.zeros((k, k, *fit.back.shape[1:] * 2))
+        turned = contrasts.T @ axes / np.sqrt(size)
+        count = len(fit.residual)
+        alpha = self.adjusted(np.concatenate([self._design(r) @ turned for r in lots(count)]))
+        square, cross = np.zeros((k, k)), np.zeros((k, k, *(self._width,) * 2))
         for rows in grouped(fit.cluster):
-            a, of, design = alpha[rows], fit.cluster[rows], fit.design[rows]
+            a, of, design = alpha[rows], fit.cluster[rows], self._design(rows)
             pulls = [sums(design * a[:, i, None], of) for i in range(k)]
             for s in range(k):
                 for t in range(s, k):

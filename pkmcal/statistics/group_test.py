@@ -7,7 +7,7 @@ chance, where the groups are of two machines. With independent Gaussian errors i
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from pkmcal.statistics.linear_fit import column_basis, grouped, means, triangle
 from pkmcal.statistics.singular_values import svd
 
 LEAST = 5  # degrees of freedom beside both groups' parameters
+_LEAST_NOISE = 10  # degrees of freedom from which equations show a noise of their own
 _NEW = 1e-3  # of a column's length that the common parameters must leave of it
 
 
@@ -47,14 +48,59 @@ class FewEquations:
         At most p + 1 of each cell.
     cell : ndarray of int (m,)
         Of each.
-    count : int
-        For how many they stand.
+    counts : ndarray of int (cells,)
+        For how many they stand, of each cell.
     """
 
     design: FloatArray
     residual: FloatArray
     cell: IntArray
-    count: int
+    counts: IntArray
+
+    def tested(self, mine: BoolArray) -> Groups | None:
+        """Test a group against the others, each by the noise that it has beside own parameters.
+
+        Weights that were found with common parameters may hide a group of another machine: what
+        these miss of it is then its noise. The test is that of S. Johansen, The Welch-James
+        approximation to the distribution of the residual sum of squares in a weighted linear
+        regression, Biometrika 67 (1980). Where a group is too small to show its noise, both have
+        one, and the test is `group_test`.
+
+        Parameters
+        ----------
+        mine : ndarray of bool (m,)
+            Which of these equations are of the group, by whole cells.
+        """
+        noise, freedoms = np.ones(len(mine)), []
+        for group in (mine, ~mine):
+            basis, values = column_basis(self.design[group]), self.residual[group]
+            left = values - basis @ (basis.T @ values)
+            squares = float(left @ left)
+            freedom = int(self.counts[np.unique(self.cell[group])].sum()) - basis.shape[1]
+            if freedom < _LEAST_NOISE or not squares > 0.0:
+                return group_test(self.design, self.residual, mine, int(self.counts.sum()))
+            noise[group] = np.sqrt(squares / freedom)
+            freedoms.append(freedom)
+        design, residual = self.design / noise[:, None], self.residual / noise
+        plain = group_test(design, residual, mine, int(self.counts.sum()))
+        return None if plain is None else _by_own_noise(design, residual, mine, freedoms, plain)
+
+
+def _by_own_noise(
+    design: FloatArray, residual: FloatArray, mine: BoolArray, freedoms: list[int], plain: Groups
+) -> Groups:
+    """The test of equations in units of a noise that was found with so many degrees of freedom."""
+    common = column_basis(design)
+    share, ways = np.linalg.eigh(common[mine].T @ common[mine])
+    told = 4.0 * share * (1.0 - share) > _NEW**2  # what both groups say something of
+    share, ways = np.clip(share[told], 0.0, 1.0), (common @ ways)[:, told]
+    along = (ways[mine].T @ residual[mine]) / np.sqrt(share * (1.0 - share))
+    along -= np.sqrt(share / (1.0 - share)) * (ways.T @ residual)
+    k, spread = len(share), 0.0
+    for other, freedom in zip((1.0 - share, share), freedoms, strict=True):
+        spread += float((other**2).sum() + other.sum() ** 2) / (2.0 * freedom)
+    ratio = float(along @ along) / (k + 2.0 * spread - 6.0 * spread / (k + 2.0))
+    return replace(plain, chance=f_tail(min(ratio, 1e300), k, k * (k + 2.0) / (3.0 * spread)))
 
 
 def few_equations(
@@ -75,16 +121,17 @@ def few_equations(
     """
     width = design.shape[1] + 1
     factors: list[FloatArray] = [np.zeros((0, width)) for _ in range(int(cell.max()) + 1)]
-    count = 0
+    counts = np.zeros(len(factors), dtype=np.intp)
     for lot in grouped(key):
         _, first, own = np.unique(key[lot], return_index=True, return_inverse=True)
         rows = use[lot]
         averaged = means(np.column_stack([design[rows], residual[rows]]), own)
-        cell_of, count = cell[rows[first]], count + len(first)
+        cell_of = cell[rows[first]]
+        counts += np.bincount(cell_of, minlength=len(factors))
         for k in np.unique(cell_of):
             factors[k] = triangle(factors[k], averaged[cell_of == k])
     whole, number = np.concatenate(factors), np.arange(len(factors))
-    return FewEquations(whole[:, :-1], whole[:, -1], number.repeat([*map(len, factors)]), count)
+    return FewEquations(whole[:, :-1], whole[:, -1], number.repeat([*map(len, factors)]), counts)
 
 
 def group_test(
@@ -101,7 +148,7 @@ def group_test(
     mine : ndarray of bool (M,)
         Which equations are of the group.
     count : int, optional
-        For how many equations these stand, if they are `few_equations`. None: for themselves.
+        For how many equations these stand. None: for themselves.
 
     Examples
     --------

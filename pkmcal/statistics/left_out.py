@@ -11,12 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.arrays import BoolArray, FloatArray, IntArray, lots
 from pkmcal.statistics.distributions import f_tail
-from pkmcal.statistics.linear_fit import LinearFit
-from pkmcal.statistics.singular_values import svd
+from pkmcal.statistics.linear_fit import LinearFit, alike
 
 _OWN = 0.99  # of what is known of a combination, from which it is the block's own
+_TOGETHER = 4096  # equations of small blocks
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,16 +56,21 @@ def left_out(fit: LinearFit, block: IntArray) -> LeftOut:
     squares, whole = 0.0, np.zeros((p, p))  # of the covariance of the residuals left out
     for b in np.unique(block):
         mine = np.flatnonzero(block == b)
-        turn, singular, rows = svd(fit.design[mine])
-        kept = 1.0 - singular**2
-        known = kept > 1.0 - _OWN
-        factor = np.where(known, 1.0 / np.where(known, kept, 1.0), 0.0)
-        own = fit.residual[mine]
-        residual[mine] = own + turn @ ((factor - 1.0) * (turn.T @ own))
-        variance[mine] = 1.0 + turn**2 @ (factor - 1.0)
-        follow = rows.T @ ((factor * singular)[:, None] ** 2 * rows)
-        squares += float((factor**2).sum()) + len(mine) - len(factor) - float((follow**2).sum())
-        whole += follow
+        size, axes = _normal(fit, mine)
+        known = _known(size)
+        factor = np.where(known, 1.0 / np.where(known, 1.0 - size, 1.0), 0.0)
+        change = axes * np.where(known, factor, -1.0 / np.where(known, 1.0, size))
+        every = list(lots(len(mine)))
+        pulls = sum(fit.design[mine[lot]].T @ fit.residual[mine[lot]] for lot in every)
+        step = change @ (axes.T @ pulls)
+        for lot in every:
+            rows = mine[lot]
+            part = fit.design[rows]
+            residual[rows] = fit.residual[rows] + part @ step
+            variance[rows] = 1.0 + np.einsum("ij,ij->i", part @ change, part @ axes)
+        follow = factor**2 * size
+        squares += float((factor**2).sum()) + len(mine) - p - float((follow**2).sum())
+        whole += (axes * follow) @ axes.T
     squares += float((whole**2).sum())
     noise = fit.squares / fit.freedom
     total = float(variance.sum())
@@ -74,3 +79,36 @@ def left_out(fit: LinearFit, block: IntArray) -> LeftOut:
     ratio = float(residual @ residual) / (total * noise)
     chance = f_tail(ratio, max(total**2 / squares / shared, 1.0), fit.freedom / shared)
     return LeftOut(residual, variance * noise, float(np.sqrt(ratio)), chance)
+
+
+def residuals_left_out(fit: LinearFit, block: IntArray) -> FloatArray:
+    """Residuals (M,) of `left_out` alone, quick where blocks are many and small."""
+    residual = np.empty(len(block))
+    for rows in alike(block, _TOGETHER):
+        part, own = fit.design[rows], fit.residual[rows][:, :, None]
+        wide = rows.shape[1] <= part.shape[2]
+        turned = part if wide else part.transpose(0, 2, 1)
+        size, axes = np.linalg.eigh(turned @ turned.transpose(0, 2, 1))
+        known = _known(size)
+        factor = np.where(known, 1.0 / np.where(known, 1.0 - size, 1.0), 0.0)[:, :, None]
+        back = axes.transpose(0, 2, 1)
+        if wide:
+            found = axes @ (factor * (back @ own))
+        else:
+            change = np.where(known, factor[:, :, 0], -1.0 / np.where(known, 1.0, size))
+            found = own + part @ (axes @ (change[:, :, None] * (back @ (turned @ own))))
+        residual[rows] = found[:, :, 0]
+    return residual
+
+
+def _known(size: FloatArray) -> BoolArray:
+    """Which combinations the other blocks determine, by squared singular values of a block."""
+    known: BoolArray = size < _OWN
+    return known
+
+
+def _normal(fit: LinearFit, mine: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Eigenvalues (p,) and vectors (p, p) of the normal matrix of some equations."""
+    parts = (fit.design[mine[lot]] for lot in lots(len(mine)))
+    size, axes = np.linalg.eigh(sum(part.T @ part for part in parts))
+    return size, axes

@@ -185,6 +185,23 @@ def grouped(key: IntArray) -> Iterator[IntArray]:
         yield order[first[lot.start] : first[lot.stop] if lot.stop < len(first) else None]
 
 
+def alike(key: IntArray, most: int) -> Iterator[IntArray]:
+    """Rows (g, m) of keys that have m rows each, in lots of at most about `most` rows.
+
+    Examples
+    --------
+    >>> [rows.tolist() for rows in alike(np.array([1, 0, 1, 2]), 10)]
+    [[[1], [3]], [[0, 2]]]
+    """
+    order = np.argsort(key, kind="stable")
+    sizes = np.bincount(key)
+    first = np.cumsum(sizes) - sizes
+    for size in np.unique(sizes[sizes > 0]).tolist():
+        of_size = first[sizes == size, None] + np.arange(size)
+        for lot in lots(len(of_size), max(most // size, 1)):
+            yield order[of_size[lot]]
+
+
 def column_basis(matrix: FloatArray) -> FloatArray:
     """Orthonormal basis (M, r) of the columns."""
     basis: FloatArray = matrix @ orthonormal(matrix)

@@ -1,22 +1,35 @@
-"""Whether numbers that a fit held would explain what it leaves: a score test by clusters.
+"""Whether numbers that a fit held would explain its residuals: a score test by clusters.
 
-Rao's test needs no other fit: what is left is regressed on the part of the held numbers' columns
+Rao's test needs no other fit: the residuals are regressed on the part of the held numbers' columns
 that the parameters cannot take up. Errors that the equations of a cluster share count by the
-sandwich of `clusters`, as Hotelling's T² with Pustejovsky and Tipton's degrees of freedom.
+sandwich of `clusters`, as Hotelling's T² with Pustejovsky and Tipton's degrees of freedom. An F
+test as if they shared none needs sums over the equations alone, and says first which columns are
+worth more.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray
+from pkmcal.arrays import FloatArray, lots
 from pkmcal.statistics.clusters import Sandwich
 from pkmcal.statistics.distributions import f_tail
 from pkmcal.statistics.linear_fit import LinearFit
 
 _SAME = 1e-6  # share of a column that must be left beside the parameters
+
+# Derivatives of the predicted values to held numbers, whitened: equations in their order, and their
+# rows (b, d). They are made anew for each pass: all at once may be larger than the design.
+Columns = Callable[[], Iterator[tuple[slice, FloatArray]]]
+
+
+def columns_of(matrix: FloatArray) -> Columns:
+    """Columns that there are already, (M, d)."""
+    return lambda: ((rows, matrix[rows]) for rows in lots(len(matrix)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +55,98 @@ class Score:
     drop: float
 
 
-def score_test(fit: LinearFit, columns: FloatArray) -> Score | None:
+@dataclass(frozen=True, eq=False)
+class Beside:
+    """Columns as they are beside the parameters of a fit.
+
+    Attributes
+    ----------
+    fit : LinearFit
+        The fit.
+    columns : Columns
+        The columns.
+    by_basis : ndarray (p, d)
+        What they have in common with the basis of the fit.
+    half : ndarray (d, k)
+        Their combinations that the parameters cannot take up, of length 1 beside these.
+    along : ndarray (k,)
+        What these have in common with the residuals.
+    """
+
+    fit: LinearFit
+    columns: Columns
+    by_basis: FloatArray
+    half: FloatArray
+    along: FloatArray
+
+    @property
+    def drop(self) -> float:
+        """Sum of squares that they explain."""
+        return float(self.along @ self.along)
+
+    @property
+    def chance(self) -> float:
+        """How likely as much would be explained if errors were independent; 1 if none are left."""
+        k, drop = len(self.along), self.drop
+        rest = self.fit.freedom - k
+        if not k or rest < 1.0:
+            return 1.0
+        over = max(self.fit.squares - drop, 0.0) / rest
+        return f_tail(min(drop / k / over, 1e300), k, rest) if over > 0.0 else 1.0
+
+    @cached_property
+    def own(self) -> FloatArray:
+        """The combinations without what the parameters take up, (M, k)."""
+        found = np.empty((len(self.fit.residual), self.half.shape[1]))
+        taken = self.by_basis @ self.half
+        for rows, some in self.columns():
+            found[rows] = some @ self.half - self.fit.design[rows] @ taken
+        return found
+
+    def score(self) -> Score | None:
+        """The test by clusters; None where too little is left."""
+        k, fit, along = len(self.along), self.fit, self.along
+        if not k or fit.freedom - k < 1:
+            return None
+        explained = self.own @ along
+        sandwich = Sandwich(replace(fit, residual=fit.residual - explained), self.own)
+        p = fit.design.shape[1]
+        prior = -fit.prior @ self.by_basis @ self.half
+        matrix = sandwich.data[p:, p:] + prior.T @ prior
+        freedom = sandwich.joint_freedom(np.eye(p + k)[p:]) - k + 1.0
+        size, axes = np.linalg.eigh(matrix)
+        if freedom < 1.0 or not size[0] > 0:
+            return None
+        ratio = float(((axes.T @ along) ** 2 / size).sum()) * freedom / (freedom + k - 1.0) / k
+        return Score(
+            size=self.half @ along,
+            deviation=np.sqrt(np.einsum("ij,jk,ik->i", self.half, matrix, self.half)),
+            chance=f_tail(min(ratio, 1e300), k, freedom),
+            explained=explained,
+            drop=self.drop,
+        )
+
+
+def beside(fit: LinearFit, columns: Columns) -> Beside | None:
+    """Find what columns are beside a fit; None where all of them are 0."""
+    sums = [
+        (some.T @ some, fit.design[rows].T @ some, some.T @ fit.residual[rows])
+        for rows, some in columns()
+    ]
+    square, by_basis, pulls = (sum(parts[1:], parts[0]) for parts in zip(*sums, strict=True))
+    size = np.sqrt(np.diag(square))
+    known = size > 0.0
+    if not known.any():
+        return None
+    unit = np.diag(1.0 / np.where(known, size, 1.0))[:, known]
+    inner = by_basis @ unit
+    values, ways = np.linalg.eigh(unit.T @ square @ unit - inner.T @ inner)
+    new = values > _SAME
+    half = unit @ (ways[:, new] / np.sqrt(values[new]))
+    return Beside(fit, columns, by_basis, half, half.T @ pulls)
+
+
+def score_test(fit: LinearFit, columns: Columns) -> Score | None:
     """Test numbers that were held.
 
     None where parameters take up all of them, or too little is left.
@@ -51,8 +155,8 @@ def score_test(fit: LinearFit, columns: FloatArray) -> Score | None:
     ----------
     fit : LinearFit
         The fit.
-    columns : ndarray (M, d)
-        Derivative of the predicted values to the held numbers, whitened.
+    columns : Columns
+        Of the numbers.
 
     Examples
     --------
@@ -61,41 +165,9 @@ def score_test(fit: LinearFit, columns: FloatArray) -> Score | None:
     >>> noise = np.array([1, -1, -1, 1, 1, -1, -1, 1])
     >>> y = 0.5 * rows + 0.01 * noise
     >>> fit = linear_fit(np.ones((8, 1)), y - y.mean(), np.zeros((0, 1)), np.eye(1), rows, 0 * rows)
-    >>> found = score_test(fit, rows[:, None].astype(float))
+    >>> found = score_test(fit, columns_of(rows[:, None].astype(float)))
     >>> round(float(found.size[0]), 3), found.chance < 1e-6
     (0.5, True)
     """
-    p = fit.design.shape[1]
-    by_basis = fit.design.T @ columns
-    values, ways = np.linalg.eigh(columns.T @ columns - by_basis.T @ by_basis)
-    new = values > _SAME * float((columns**2).sum(axis=0).max())
-    half = ways[:, new] / np.sqrt(values[new])
-    k = half.shape[1]
-    if not k or fit.freedom - k < 1:
-        return None
-    own = (columns - fit.design @ by_basis) @ half
-    along = half.T @ (columns.T @ fit.residual)
-    explained = own @ along
-    wider = LinearFit(
-        design=np.hstack([fit.design, own]),
-        residual=fit.residual - explained,
-        prior=np.hstack([fit.prior, -fit.prior @ by_basis @ half]),
-        back=np.eye(p + k),
-        cluster=fit.cluster,
-        component=fit.component,
-    )
-    contrasts = np.eye(p + k)[p:]
-    sandwich = Sandwich(wider)
-    matrix = (sandwich.data + wider.prior.T @ wider.prior)[p:, p:]
-    freedom = sandwich.joint_freedom(contrasts) - k + 1.0
-    size, axes = np.linalg.eigh(matrix)
-    if freedom < 1.0 or not size[0] > 0:
-        return None
-    ratio = float(((axes.T @ along) ** 2 / size).sum()) * freedom / (freedom + k - 1.0) / k
-    return Score(
-        size=half @ along,
-        deviation=np.sqrt(np.einsum("ij,jk,ik->i", half, matrix, half)),
-        chance=f_tail(min(ratio, 1e300), k, freedom),
-        explained=explained,
-        drop=float(along @ along),
-    )
+    tested = beside(fit, columns)
+    return None if tested is None else tested.score()

@@ -83,7 +83,7 @@ def places(
 
 def element(data: dict[str, Any]) -> str:
     """The element of a page that shows the machine, with all that it needs but its style."""
-    return _ELEMENT + _LOADER % (packed(scripts().encode()), _given(data))
+    return _ELEMENT + _LOADER % (packed(scripts(*_more(data)).encode()), _given(data))
 
 
 def plain_element(data: dict[str, Any]) -> tuple[str, str]:
@@ -91,10 +91,15 @@ def plain_element(data: dict[str, Any]) -> tuple[str, str]:
 
     The scripts are as they are, for unpacking them would take the right to run any text.
     """
-    run = f"\n(async (root, data) => {{\n{scripts('calibration' in data)}\n}})"
+    run = f"\n(async (root, data) => {{\n{scripts(*_more(data))}\n}})"
     run += f"(document.currentScript.previousElementSibling, {_given(data)})\n"
     digest = b64encode(sha256(run.encode()).digest()).decode()
     return f"{_ELEMENT}<script>{run}</script>\n", f"sha256-{digest}"
+
+
+def _more(data: dict[str, Any]) -> list[str]:
+    """Scripts that not every page needs."""
+    return [name for name in ("calibration", "stiffness") if data.get(name)]
 
 
 def _given(data: dict[str, Any]) -> str:
@@ -120,9 +125,9 @@ def style() -> str:
 
 
 @cache
-def scripts(calibration: bool = False) -> str:
+def scripts(*more: str) -> str:
     """All scripts of the element, one after the other: the body of a function of root and data."""
-    names = [*_SCRIPTS, *(["calibration"] if calibration else []), "start"]
+    names = [*_SCRIPTS, *more, "start"]
     body = "\n".join(_squeezed(_text(f"page/{name}.js")) for name in names)
     return f"'use strict'\n{body}\nreturn start(root, data)"
 

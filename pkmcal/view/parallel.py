@@ -19,7 +19,7 @@ from pkmcal.kinematics.frames import NOWHERE
 from pkmcal.kinematics.reading_units import reading_units
 from pkmcal.kinematics.robot import Robot
 from pkmcal.screw import from_pose
-from pkmcal.view import chains, drives, memory, ranges, words
+from pkmcal.view import chains, drives, memory, ranges, words, yielding
 
 _OFFSET, _GAIN = SLOTS.index("offset"), SLOTS.index("gain")
 _TRACK = 25  # points of the path of a crank's end
@@ -90,7 +90,9 @@ def data(robot: Robot, cloud: bool) -> dict[str, Any]:
         "laws": laws,
     }
     if cloud:
-        found["cloud"] = ranges.cloud(robot, spans)
+        poses, found["cloud"] = ranges.cloud(robot, spans)
+        if given is not robot:
+            found["stiffness"] = yielding.data(given, poses)
     if model.chains is None:
         return found | {"limbs": _limbs(robot, np.array(moves))}
     assert isinstance(machine, ChainMachine)

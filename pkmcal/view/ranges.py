@@ -101,10 +101,11 @@ def modes(robot: Robot) -> dict[str, Any]:
     return {"poses": poses.tolist(), "complete": bool(found.complete)}
 
 
-def cloud(robot: Robot, ranges: dict[str, tuple[float, float]]) -> FloatArray:
-    """Positions of good poses (N, 3), mm: within all limits, not near a singularity.
+def cloud(robot: Robot, ranges: dict[str, tuple[float, float]]) -> tuple[FloatArray, FloatArray]:
+    """Good poses (N, 6), within all limits and not near a singularity, and where to draw them.
 
-    Of machines that only turn, where a point in front of the platform goes.
+    That is their position (N, 3), mm; of machines that only turn, where a point in front of the
+    platform goes.
     """
     moved = [name for name in ranges if name in POSE[:3]]
     turned = [name for name in ranges if name in POSE[3:]]
@@ -119,7 +120,7 @@ def cloud(robot: Robot, ranges: dict[str, tuple[float, float]]) -> FloatArray:
     drawn = completed(robot, drawn)
     kept = drawn[good_poses(robot, drawn)][:_CLOUD]
     if len(moved) > 1:
-        return kept[:, :3]
+        return kept, kept[:, :3]
     a, b, c = kept[:, 3:].T  # the third column of Rz(γ) Ry(β) Rx(α): where the platform's z points
     up = np.stack([
         np.cos(a) * np.sin(b) * np.cos(c) + np.sin(a) * np.sin(c),
@@ -127,4 +128,4 @@ def cloud(robot: Robot, ranges: dict[str, tuple[float, float]]) -> FloatArray:
         np.cos(a) * np.cos(b),
     ], axis=1)  # fmt: skip
     shown: FloatArray = kept[:, :3] + robot.length * up
-    return shown
+    return kept, shown

@@ -16,6 +16,7 @@ from pkmcal.kinematics.stiffness import stiffness
 
 SYMBOLS = {"alpha": "α", "beta": "β", "gamma": "γ"}
 _COUNTS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
+_SAG = 1e-6  # mm: less is rounding
 _PLURALS = {
     "a leg": "legs", "a carriage and a rod": "carriages, each with a rod",
     "a crank and a rod": "cranks, each with a rod", "a cable or belt": "cables or belts",
@@ -66,12 +67,13 @@ def of_yielding(robot: Robot) -> str:
     if robot is robot.rigid:
         return ""
     home = robot.home
-    sag = robot.forward(robot.rigid.inverse(home), guess=home).pose[:3] - home[:3]
+    off = robot.forward(robot.rigid.inverse(home), guess=home).pose[:3] - home[:3]
+    sag = float(np.linalg.norm(off))
     softest = float(stiffness(robot, home).softest[1])
+    sags = f"sags by {sag:.2g} mm under the load that its file states, and " if sag > _SAG else ""
     return (
-        f" What yields is left out here: at home the machine sags by {np.linalg.norm(sag):.2g} mm"
-        f" under the load that its file states, and gives way by 1 mm at {softest:.3g} N along its"
-        " softest direction."
+        f" What yields is left out of its motions here: at home the machine {sags}gives way by 1 mm"
+        f" at {softest:.3g} N along its softest direction."
     )
 
 

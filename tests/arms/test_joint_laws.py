@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 
 import pkmcal as pk
 from pkmcal.arms.joint_laws import JointLaws, Term, sag_term
+from pkmcal.arms.joint_pulls import Balancer, JointPulls
 from pkmcal.arms.weights import gravity_products, gravity_torques
 from pkmcal.kinematics.calibratable import ArmMachine
 
@@ -37,8 +39,23 @@ TERMS = {
 
 def lawful(arm: pk.SerialArm = SIX, seed: int = 0) -> pk.SerialArm:
     rng = np.random.default_rng(seed)
-    laws = JointLaws(arm.axes, arm.points, arm.kinds, TERMS, masses=MASSES, centres=CENTRES)
+    pulls = JointPulls(arm.axes, arm.points, arm.kinds, masses=MASSES, centres=CENTRES)
+    laws = JointLaws(pulls, TERMS)
     return arm.replace(rng.normal(size=(6, 6)) * [1, 1, 1, 3e-3, 3e-3, 3e-3]).with_laws(laws)
+
+
+def loaded(rows: int = 8, seed: int = 0) -> pk.SerialArm:
+    """With a balancer, and another load at the tool in each row."""
+    rng = np.random.default_rng(seed)
+    arm = lawful(seed=seed).yielding({2: 3e-8, 4: 2e-7, 6: 4e-7})
+    balancer = Balancer((-80.0, 10.0, 250.0), (90.0, 0.0, 500.0), 12.0, 150.0)
+    laws = arm.joint_laws
+    arm = arm.with_laws(replace(laws, pulls=replace(laws.pulls, balancers={1: balancer})))
+    load = pk.Load(
+        rng.uniform(0, 9, rows), rng.normal(0, 60, (rows, 3)), rng.normal(0, 50, (rows, 3)),
+        rng.normal(0, 9e3, (rows, 3)),
+    )  # fmt: skip
+    return arm.under(load)
 
 
 def thetas(count: int = 8, seed: int = 0) -> np.ndarray:
@@ -60,8 +77,9 @@ def test_joints_stand_where_the_laws_say() -> None:
     np.testing.assert_allclose(found, arm.rigid.forward(moved), rtol=0, atol=1e-9)
 
 
-def test_the_jacobian_is_the_change_of_the_tool_with_the_commands() -> None:
-    arm, theta = lawful(), thetas(4)
+@pytest.mark.parametrize("arm", [lawful(), loaded(4)], ids=["lawful", "loaded"])
+def test_the_jacobian_is_the_change_of_the_tool_with_the_commands(arm: pk.SerialArm) -> None:
+    theta = thetas(4)
     by_joints, step = arm.jacobian(theta, frame="tip"), 1e-6
     for k in range(6):
         ends = [arm.forward(theta + sign * step * np.eye(6)[k]) for sign in (1, -1)]
@@ -94,7 +112,7 @@ def _twist(one: np.ndarray, other: np.ndarray, here: np.ndarray) -> np.ndarray:
 @settings(max_examples=15, deadline=None)
 @given(seed=st.integers(0, 1000))
 def test_the_inverse_leads_to_the_target_with_laws(seed: int) -> None:
-    arm, theta = lawful(seed=seed), thetas(5, seed)
+    arm, theta = loaded(5, seed).approaching(np.tile([1, -1, 0, 1, 0, -1], (5, 1))), thetas(5, seed)
     target = arm.forward(theta)
     found = arm.inverse(target, guess=theta + 1e-2)
     good = found.ok
@@ -102,8 +120,8 @@ def test_the_inverse_leads_to_the_target_with_laws(seed: int) -> None:
     assert np.abs(arm.forward(found.theta) - target)[good].max() < 1e-8
 
 
-def test_files_keep_laws_to_the_last_bit(tmp_path: Path) -> None:
-    arm = lawful()
+@pytest.mark.parametrize("arm", [lawful(), loaded().under(None)], ids=["lawful", "loaded"])
+def test_files_keep_laws_to_the_last_bit(arm: pk.SerialArm, tmp_path: Path) -> None:
     arm.save(tmp_path / "arm.toml")
     again = pk.load(tmp_path / "arm.toml")
     assert again.laws.terms == arm.laws.terms
@@ -117,7 +135,7 @@ def test_an_arm_without_laws_is_as_it_was(tmp_path: Path) -> None:
     assert SIX.laws is None and SIX.rigid is SIX
     SIX.save(tmp_path / "arm.toml")
     assert "drive" not in (tmp_path / "arm.toml").read_text()
-    none = SIX.with_laws(JointLaws(SIX.axes, SIX.points, SIX.kinds, {}))
+    none = SIX.with_laws(JointLaws(JointPulls(SIX.axes, SIX.points, SIX.kinds)))
     assert none.forward(thetas()).tobytes() == SIX.forward(thetas()).tobytes()
     assert none.jacobian(thetas()).tobytes() == SIX.jacobian(thetas()).tobytes()
 
@@ -184,3 +202,73 @@ def test_gravity_of_a_file_turns_what_it_turns(tmp_path: Path) -> None:
     at = np.zeros(2)
     assert (standing.forward(at) == standing.rigid.forward(at)).all()
     assert hanging.forward(at)[1, 3] == pytest.approx(500 * np.sin(np.radians(0.1)), rel=1e-6)
+
+
+def test_a_load_turns_joints_by_the_work_that_it_does() -> None:
+    """τ = Jᵀw by the core's twists of a rigid arm, and rows by themselves."""
+    rng, theta = np.random.default_rng(5), thetas(6)
+    mass, centre = rng.uniform(0, 9, 6), rng.normal(0, 60, (6, 3))
+    force, moment = rng.normal(0, 50, (6, 3)), rng.normal(0, 9e3, (6, 3))
+    soft = np.array([2.0, 3.0, 4.0, 9.0, 8.0, 7.0]) * 1e-8
+    plain = SIX.yielding(dict(enumerate(soft, 1)))
+    weight = mass[:, None] * [0, 0, -9.80665]
+    away = np.einsum("nij,nj->ni", SIX.forward(theta)[:, :3, :3], centre)
+    wrench = np.hstack([moment + np.cross(away, weight), force + weight])
+    torque = np.einsum("nki,nk->ni", SIX.jacobian(theta, frame="tip"), wrench)
+    found = plain.under(pk.Load(mass, centre, force, moment))
+    wanted = SIX.forward(theta + soft * torque)
+    np.testing.assert_allclose(found.forward(theta), wanted, rtol=0, atol=1e-9)
+    for i in range(6):
+        one = plain.under(pk.Load(mass[i], centre[i], force[i], moment[i])).forward(theta[i])
+        np.testing.assert_allclose(one, wanted[i], rtol=0, atol=1e-9)
+    np.testing.assert_array_equal(plain.forward(theta), SIX.forward(theta))  # without masses
+
+
+def test_a_balancer_turns_its_joint_by_the_energy_that_it_has() -> None:
+    balancer = Balancer((-80.0, 10.0, 250.0), (90.0, 0.0, 500.0), 12.0, 150.0)
+    pulls = JointPulls(SIX.axes, SIX.points, SIX.kinds, balancers={1: balancer})
+    theta = np.zeros((7, 6))
+    theta[:, 1] = np.linspace(-2, 2, 7)
+
+    def energy(angle: np.ndarray) -> np.ndarray:
+        turned = pk.SerialArm([AXES[1]], [POINTS[1]], [*balancer.link, 0, 0, 0])
+        way = turned.forward(angle[:, None])[:, :3, 3] - balancer.base
+        return 0.5 * balancer.rate * (np.linalg.norm(way, axis=1) - balancer.free) ** 2
+
+    step = 1e-5
+    slope = -(energy(theta[:, 1] + step) - energy(theta[:, 1] - step)) / (2 * step)
+    laws = JointLaws(pulls, {}).weighing(np.zeros(6), SIX.points)
+    arm = SIX.with_laws(laws).yielding({2: 1e-8})
+    wanted = theta.copy()
+    wanted[:, 1] += 1e-8 * slope
+    np.testing.assert_allclose(arm.forward(theta), SIX.forward(wanted), rtol=0, atol=1e-7)
+
+
+def test_stiffness_of_files_is_what_its_compliance_is(tmp_path: Path) -> None:
+    """20 kN m/rad, in an arm of 2 kg with its centre 300 mm out: 5.88 N m turn it by 0.294 mrad."""
+    one = """name = "one"
+units = { length = "mm", angle = "deg" }
+[tool]
+home = { x = 600.0 }
+[[joint]]
+kind = "revolute"
+axis = [0, 1, 0]
+point = [0, 0, 0]
+mass = 2.0
+centre = [300, 0, 0]
+"""
+    (tmp_path / "arm.toml").write_text(one + "stiffness = 2.0e4\n")
+    arm = pk.load(tmp_path / "arm.toml")
+    assert arm.forward([0.0])[2, 3] == pytest.approx(-600 * 2 * 9.80665 * 0.3 / 2e4, rel=1e-6)
+    again = one + "drive = { compliance = 5.0e-8 }\n"
+    (tmp_path / "again.toml").write_text(again)
+    np.testing.assert_array_equal(pk.load(tmp_path / "again.toml").forward([0]), arm.forward([0]))
+    for wrong, message in (
+        ("stiffness = -1.0", "stiffness: must be above 0"),
+        ("stiffness = 2e4\ndrive = { compliance = 1e-8 }", "stiffness already"),
+        ("balancer = {base = [0, 0, 1], link = [0, 0, 2], rate = -1, free = 0 }", "rate: must not"),
+        ("balancer = { base = [0, 0, 1], link = [0, 0, 2] }", "rate"),
+    ):
+        (tmp_path / "wrong.toml").write_text(one + wrong)
+        with pytest.raises(pk.FileError, match=message):
+            pk.load(tmp_path / "wrong.toml")

@@ -317,7 +317,7 @@ def test_mistake_in_a_robot_file_is_named_with_the_file(
         ([ROBOT, PROBE, "--prior", "radius=-1"], "prior of radius must be positive"),
         ([ROBOT, PROBE, "--prior", "radius=1deg"], "expected one of mm, "),
         ([ROBOT, PROBE, "--prior", "angle1=1"], "angle1 is an angle; give it a unit"),
-        ([ROBOT, PROBE, "--prior", "*=1"], "--prior *=1: covers lengths, angles"),
+        ([ROBOT, PROBE, "--prior", "*=1"], "covers lengths ("),
         ([ROBOT, PROBE, "--prior", "1", "--prior", "radius=2"], "--prior 1: a number without"),
         ([ROBOT, PROBE, "--free", "gain*", "--prior", "gain*=1mm"], "unit 'mm'; expected none"),
         ([ROBOT, PROBE, "--holdout", "1.5"], "holdout must be a fraction between 0 and 1"),

@@ -34,7 +34,8 @@ def test_words_stand_beside_each_other() -> None:
 @pytest.mark.parametrize(
     "word, message",
     [
-        ("sagg", "expected one of sag, .* did you mean 'sag'"),
+        ("sagg", "must be one of sag, .* did you mean 'sag'"),
+        ("", "must be one of sag, harmonics, [^;]*; found ''$"),
         ("sag=two", "sag=tied or joints"),
         ("harmonics", "waves a turn"),
         ("coupling=5", "a joint and the one that turns it"),

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
+from pkmcal.files.csv_table import Table
+from pkmcal.measurements.pose_csv import write_poses
 
 LOAD = ("--payload", "11 lb", "--payload-at", "5,0,40", "--tool-force", "0,30,-10")
 
@@ -44,11 +46,55 @@ def test_stiffness_is_that_of_the_package(run: Any, stiff: Path) -> None:
     assert "softest" in run("stiffness", stiff).stdout
 
 
+def test_cut_moves_the_tool_as_the_machine_under_that_force(
+    run: Any, stiff: Path, tmp_path: Path
+) -> None:
+    robot, cut = pk.load(stiff), (3.0, -2.0, 5.0)
+    poses = pk.sample_poses(robot.rigid, 5, seed=3)
+    table = tmp_path / "poses.csv"
+    write_poses(table, poses)
+    out = tmp_path / "map.csv"
+    said = run("stiffness", stiff, table, "--cut", "3,-2,5", "--out", out, "--json").stdout
+    moved = np.array(json.loads(said)["moved"])
+    q = robot.inverse(poses)
+    held = robot.forward(q, guess=poses, load=pk.Load(force=cut)).pose
+    assert np.abs(moved - (held - poses)[:, :3]).max() < 1e-3 * np.abs(moved).max()
+    rows = Table(out)
+    written = np.stack([rows.numbers(f"moved {axis}", "mm")[0] for axis in "xyz"], axis=1)
+    assert np.abs(written - moved).max() < 1e-7
+    assert "3,-2,5 N at the tool move it by" in run("stiffness", stiff, "--cut", "3,-2,5").stdout
+
+
+def test_program_is_corrected_for_the_load_of_each_tool(
+    run: Any, refused: Any, stiff: Path, tmp_path: Path
+) -> None:
+    program = tmp_path / "part.ngc"
+    program.write_text("G0 X0 Y0 Z800 A0 B0 C0\nT1 M6\nG0 X5 Y0 Z800 A0 B3 C0\n", encoding="utf-8")
+    words = ("compensate", "hexapod", program, stiff, "--firmware", "linuxcnc")
+    options = ("--payload", "2kg", "--load", "T1=40kg,0,10,60", "--out", tmp_path / "out")
+    assert run(*words, *options).exit_code == 0
+    wanted = pk.compensate_program(
+        pk.load("hexapod"),
+        pk.load(stiff).carrying(pk.Load(2.0)),
+        program,
+        firmware="linuxcnc",
+        loads={1: pk.Load(40.0, (0.0, 10.0, 60.0))},
+    ).text
+    written = (tmp_path / "out" / "part.ngc").read_text(encoding="utf-8")
+    assert wanted in written
+    assert "T1 twice" in refused(*words, "--out", tmp_path, "--load", "T1=1", "--load", "1=2")
+    assert "T1=MASS" in refused(*words, "--out", tmp_path, "--load", "1kg")
+    assert "--load says nothing of a table" in refused(
+        "compensate", stiff, "a.csv", "b.csv", "--load", "T1=1kg"
+    )
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
         (("inverse", "hexapod", "0,0,800,0,0,0", "--payload", "5kg"), "nothing of hexapod yields"),
         (("stiffness", "hexapod"), "nothing of hexapod yields"),
+        (("stiffness", "hexapod", "--compliance", "offset*=1e-4", "--cut", "1"), "--cut"),
         (("stiffness", "hexapod", "--compliance", "offset1"), "--compliance must be NAME=C"),
         (("forward", "3r", "0,0,0", "--payload", "5"), "carries no payload here"),
     ],

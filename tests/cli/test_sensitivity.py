@@ -204,9 +204,7 @@ def test_wrong_options_are_refused_in_one_line(refused: Any) -> None:
     assert "--sigma base1.x: expected NAME=NUMBER" in refused(
         "tolerance", "2tpr2tps", "--sigma", "base1.x"
     )
-    assert "--sigma *=1: covers lengths, angles" in refused(
-        "tolerance", "rbt-6t03p", "--sigma", "*=1"
-    )
+    assert "covers lengths (" in refused("tolerance", "rbt-6t03p", "--sigma", "*=1")
     few = ["tolerance", "2tpr2tps", "--sigma", "0.1", "--samples", "10", "--out", "t"]
     assert "'x' is not one of y, z, alpha, beta" in refused(*few, "--map", "x,z")
     assert "expected two coordinates" in refused(*few, "--map", "y")

@@ -136,9 +136,8 @@ def program(firmware: str, rng: random.Random, odd: int = 0, joints: bool = Fals
     for _ in range(rng.randrange(3, 12)):
         kind = rng.random()
         if kind < 0.55:
-            lines.append(
-                _move(firmware, rng, unit, relative, rng.choice(["X", "XY", "XYZ", "Z", "Y", ""]))
-            )
+            axes = rng.choice(["X", "XY", "XYZ", "Z", "Y", "X" if joints else ""])
+            lines.append(_move(firmware, rng, unit, relative, axes))
         elif kind < 0.75:
             lines.append(_one(HARMLESS[firmware], rng))
         elif kind < 0.85 and not joints:
@@ -160,9 +159,7 @@ def program(firmware: str, rng: random.Random, odd: int = 0, joints: bool = Fals
         if rng.random() < 0.4:
             lines = ["%", *rng.choice([[], ["O1000"], ["(PART 7)"]]), *lines, "%"]
             lines += rng.choice([[], ["G1 X9 Y9"]])
-    end = rng.choice(
-        ["\n", "\r\n"] if firmware in ("linuxcnc", "klipper") else ["\n", "\r\n", "\r"]
-    )
+    end = rng.choice(["\n", "\r\n", "\r"] if firmware == "marlin" else ["\n", "\r\n"])
     return rng.choice(["", "", "\ufeff"]) + end.join(lines) + rng.choice(["", end])
 
 

@@ -130,6 +130,8 @@ def _act(it: Controller, words: list[tuple[str, float]], state: dict, line: str)
         it.hidden()
     for each in (0, 1):
         state["motion"] = each if each in g else state["motion"]
+    if 1 in g and state["times"] and "F" not in values:
+        raise AssertionError("G1 in G93 without F")
     if 80 in g:
         state["motion"] = None
     targets = {

@@ -251,10 +251,30 @@ def test_feed_beside_a_change_of_units_is_refused(tmp_path: Path) -> None:
     assert corrected(tmp_path, "G21 G90 G94 F100\nG1 X0 Y0 Z200\n", firmware="linuxcnc").moves == 1
 
 
-@pytest.mark.parametrize("firmware", ["linuxcnc", "klipper"])
+@pytest.mark.parametrize("firmware", ["linuxcnc", "klipper", "reprap"])
 def test_a_carriage_return_alone_ends_no_line(firmware: str, tmp_path: Path) -> None:
     with pytest.raises(pk.FileError, match=r"line 2: .* ends no line at a carriage return alone"):
         corrected(tmp_path, "G1 X0 Y0 Z200 F600\n; note\rG1 X5\n", firmware=firmware)
+
+
+@pytest.mark.parametrize("firmware", ["linuxcnc", "marlin", "reprap", "klipper"])
+def test_a_zero_byte_may_end_a_line_wherever_it_is(firmware: str, tmp_path: Path) -> None:
+    """Binary G-code has some, too."""
+    for text in ("G1 X0 Y0 Z200 F600\n; note\0G1 X5\n", "GCDE\1\0\0\0\n"):
+        with pytest.raises(pk.FileError, match=r"line [12]: has a zero byte"):
+            corrected(tmp_path, text, firmware=firmware)
+
+
+def test_g1_alone_would_stop_a_program_that_states_times(tmp_path: Path) -> None:
+    """LinuxCNC wants F with each G1 in G93, though not in G94."""
+    begin = "G21 G90 G94\nG0 X0 Y0 Z30\n"
+    for line in ("G1", "G1 S400", "G1 M8"):
+        text = f"{begin}{line}\nX3 F900\n"
+        assert corrected(tmp_path, text, firmware="linuxcnc", chord=1.0).moves == 2
+        with pytest.raises(pk.FileError, match=r"line 3: .* needs axis words or F"):
+            corrected(tmp_path, text, joints=True, chord=1.0)
+    stated = corrected(tmp_path, f"{begin}G1 F900\nX3\n", joints=True, chord=1.0).text
+    assert stated.splitlines()[2] == "G1 F900"
 
 
 ORIGIN = "moves the origin, or skews or scales axes"
@@ -301,6 +321,7 @@ REFUSED = [
     ("reprap", "M376 H5", "M376 adds a map of the bed"),
     ("reprap", "G1 X1E-5", "E right behind a number"),
     ("reprap", 'M32 "a.g"', "M32 runs another program"),
+    ("reprap", "M906 X5 'G1 X9", "a G or M behind '"),
     ("reprap", "G1 X5 G1 Y5", "two moves stand in it"),
     *[
         ("klipper", f"{each} X=1", f"{each} {ORIGIN}")
@@ -545,7 +566,7 @@ def test_bends_of_a_table_are_looked_at_wherever_they_are(
 def test_memory_does_not_grow_with_a_program(tmp_path: Path) -> None:
     """But for the program itself, when it is written to a file."""
     peaks = []
-    for count in (5_000, 15_000):
+    for count in (15_000, 30_000):  # more than are in memory at once
         path = tmp_path / f"{count}.gcode"
         lines = (f"G1 X{k % 60 - 30} Y{k % 47 - 23} Z{k % 31} F900\n" for k in range(count))
         path.write_text("".join(lines))

@@ -57,6 +57,10 @@ CASES["sled on four belts"] = lambda: robots.made(
         for y in (0.0, 2000.0)
     ],
 )
+CARRIED = pk.Load(mass=25.0, centre=(10.0, -20.0, 60.0), force=(30.0, 0.0, -80.0))
+CASES["loaded"] = lambda: pk.load("hexapod").yielding({"offset*": 1e-4}).carrying(CARRIED)
+CASES["loaded 3prs"] = lambda: pk.load("3prs").yielding({"offset*": 1e-4}).carrying(CARRIED)
+CASES["loaded cranks"] = lambda: pk.load("6-rus").yielding({"offset*": 1e-6}).carrying(CARRIED)
 CASES["framed"] = lambda: robots.hexapod({"offset": 12.0, "gain": -1.01}, frames=FRAMES)
 
 
@@ -212,6 +216,28 @@ def test_simulation_homes_and_runs_poses(name: str, linuxcnc: Any, tmp_path: Pat
     found = linuxcnc(tmp_path / "machine" / "machine.ini", "pkm_machine", lines)
     assert len(found) == 20 and not any(each["failed"] or each["said"] for each in found)
     joints = in_degrees(robot, robot.inverse(poses, match=True))
+    np.testing.assert_allclose([each["joints"] for each in found], joints, rtol=0, atol=1e-9)
+    want = [world(robot, pose) for pose in poses]
+    np.testing.assert_allclose([each["actual"] for each in found], want, rtol=0, atol=1e-9)
+
+
+@needs_linuxcnc
+@needs_root
+def test_simulation_runs_poses_under_the_load_of_its_pins(linuxcnc: Any, tmp_path: Path) -> None:
+    robot = pk.load("hexapod").yielding({"offset*": 1e-4})
+    ini = tmp_path / "machine" / "machine.ini"
+    pk.export.linuxcnc(robot, ini.parent)
+    pins = {"payload.mass": CARRIED.mass}
+    pins |= {f"payload.{axis}": CARRIED.centre[k] for k, axis in enumerate("xyz")}
+    pins |= {f"force.{axis}": CARRIED.force[k] for k, axis in enumerate("xyz")}
+    lines = [f"setp pkm_machine.{name} {value}" for name, value in pins.items()]
+    hal = ini.with_name("machine.hal")
+    hal.write_text("\n".join([hal.read_text(), *lines, ""]))
+    poses = poses_of(robot, 8)
+    found = linuxcnc(ini, "pkm_machine", [move(robot, pose) for pose in poses])
+    assert len(found) == 8 and not any(each["failed"] or each["said"] for each in found)
+    joints = robot.inverse(poses, load=CARRIED)
+    assert np.abs(joints - robot.rigid.inverse(poses)).min(axis=1).max() > 1e-3
     np.testing.assert_allclose([each["joints"] for each in found], joints, rtol=0, atol=1e-9)
     want = [world(robot, pose) for pose in poses]
     np.testing.assert_allclose([each["actual"] for each in found], want, rtol=0, atol=1e-9)

@@ -16,6 +16,8 @@ from pkmcal.arrays import FloatArray
 from pkmcal.diagnostics.families import unlike_families
 from pkmcal.fitted.solution import Solution
 
+from ..simulated import with_errors
+
 Spoil = Callable[[FloatArray, np.random.Generator], FloatArray]
 SIGMA = np.array([0.02, 0.02, 0.02, 5e-5, 5e-5, 5e-5])
 ARM = pk.SerialArm.from_dh(
@@ -145,6 +147,28 @@ def test_an_order_is_named_where_errors_of_the_machine_hide_it(hexapod: pk.Robot
     with pytest.warns(pk.CalibrationWarning, match=r"\(--rotation XYZ\)"):
         found = pk.identify(hexapod, pk.Measurements(q, wrong, "pose"), "offset*")
     assert found.verdict.state == "doubtful"
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(("mistake", "words"), [
+    (None, ""), ("gamma reversed", "gamma counts the other way"), ("YZX", "(--rotation YZX)"),
+])  # fmt: skip
+def test_mistakes_that_numbers_of_the_machine_take_up_are_named(
+    mistake: str | None, words: str, seed: int
+) -> None:
+    """A platform that turns about z by its errors alone, all numbers free."""
+    robot = pk.load("2tpr2tps-spatial")
+    rng = np.random.default_rng(seed)
+    true = with_errors(robot, 0.4, rng)
+    asked = pk.sample_poses(robot, 40, seed=seed)
+    q = robot.inverse(asked)
+    poses = true.forward(q, guess=asked).pose + rng.normal(size=(40, 6)) * SIGMA
+    values = poses if mistake is None else MISTAKES[mistake](poses, rng)
+    good = np.isfinite(values).all(axis=1)
+    verdict = pk.identify(robot, pk.Measurements(q[good], values[good], "pose")).verdict
+    said = [each.text for each in verdict.said if each.check == "other-reading"]
+    assert len(said) == (mistake is not None) and all(words in text for text in said)
+    assert (verdict.state == "calibrated") == (mistake is None)
 
 
 def test_held_out_angles_are_judged_beside_lengths(hexapod: pk.Robot) -> None:

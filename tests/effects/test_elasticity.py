@@ -258,12 +258,14 @@ def test_numbers_that_do_not_yield_are_refused_by_name(effect: object, message: 
         pk.identify(robot, rows, effects=[effect()])  # type: ignore[operator]
 
 
-def test_an_arm_and_an_effect_stated_twice_are_refused() -> None:
+def test_what_no_arm_has_and_an_effect_stated_twice_are_refused() -> None:
     arm = pk.load("3r")
     q = np.zeros((4, arm.n_joints)) + np.arange(4)[:, None] * 0.1
     rows = pk.Measurements(q, np.zeros((4, 3)), sigma=1.0)
-    with pytest.raises(ValueError, match=r"elasticity: .* is an arm"):
+    with pytest.raises(ValueError, match=r"no joint of the arm .* matches 'offset"):
         pk.identify(arm, rows, effects=[pk.Elasticity()])
+    with pytest.raises(ValueError, match="per_length"):
+        pk.identify(arm, rows, effects=[pk.Elasticity("joint*", per_length=True)])
     robot = pk.load("hexapod")
     rows = pk.VirtualMachine(robot, NOISE).measure(twice(robot, 10), "pose")
     with pytest.raises(ValueError, match="elasticity is stated more than once"):

@@ -13,12 +13,13 @@ import pytest
 
 import pkmcal as pk
 from pkmcal.arms.joint_laws import JointLaws, Term
+from pkmcal.arms.joint_pulls import JointPulls
 from pkmcal.arms.weights import at_rest, gravity_torques
 from pkmcal.arrays import FloatArray
 from pkmcal.calibration.rigid import rigid_arm
 from pkmcal.diagnostics.waves import scan_waves
 from pkmcal.fitted.left_out import compared_by_poses
-from pkmcal.kinematics.calibratable import ArmMachine, as_machine
+from pkmcal.kinematics.calibratable import ERRORS, ArmMachine, as_machine
 
 AXES = [[0, 0, 1], [0, 1, 0], [0, 1, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0]]
 POINTS = [[0, 0, 0], [0, 0, 290], [0, 0, 560], [0, 0, 630], [302, 0, 630], [374, 0, 630]]
@@ -109,8 +110,9 @@ def test_the_verdict_suggests_sag_with_the_gain_that_it_has() -> None:
     stiff = 0.2 * SOFT
     m = measured(commands(40, 11), built(4), 12, stiff)
     rigid = pk.identify(ARM, m, **UNKNOWN)
-    (said,) = [text for text in rigid.verdict.remarks if "torque of gravity" in text]
-    assert "--effects sag" in said
+    (said,) = [each for each in rigid.verdict.said if "gravity" in each.text or "sag" in each.text]
+    assert "poses left out: " in said.text and "--effects sag" in said.text
+    assert not [each for each in rigid.verdict.said if each.check == "causes"]  # said once
     found = pk.identify(ARM, m, effects="auto", **UNKNOWN)
     assert any("the arm sags" in text for text in found.verdict.remarks)
     held = measured(commands(100, 13), built(4), 14, stiff)
@@ -119,13 +121,48 @@ def test_the_verdict_suggests_sag_with_the_gain_that_it_has() -> None:
     assert after < 0.9 * before
 
 
+def test_sag_that_moves_the_numbers_makes_a_result_doubtful() -> None:
+    """By more than their ±: the intervals of the rigid arm miss the true numbers."""
+    true = built(4)
+    rigid = pk.identify(ARM, measured(commands(40, 11), true, 12, SOFT, frame=NOWHERE))
+    (said,) = [each for each in rigid.verdict.said if each.check == "sag-lacking"]
+    assert said.level == "doubt" and rigid.verdict.state == "doubtful"
+    assert "of their ±" in said.text
+    place = [int(name[5]) * 6 - 6 + ERRORS.index(name.split(".")[1]) for name in rigid.free]
+    truth, (low, high) = true.joint_errors.reshape(-1)[place], rigid.interval95.T
+    known = np.isfinite(low)
+    assert np.mean((low <= truth) & (truth <= high), where=known) < 0.9
+
+
+@pytest.mark.parametrize(
+    ("effect", "size", "name", "option"),
+    [
+        (pk.Harmonics(1), 5e-4, "eccentric encoders", "--effects harmonics=1"),
+        (pk.Coupling([(6, 4)]), 2e-3, "coupled joints", "--effects coupling=5.4:6.4:6.5"),
+    ],
+)
+def test_errors_of_gears_are_named(
+    effect: pk.Harmonics, size: float, name: str, option: str
+) -> None:
+    """Of joint 1 and the wrist, which gravity hardly turns."""
+    named = 0
+    for seed in range(3):
+        arm = effect.of_machine(as_machine(built(seed))).machine.arm
+        of = [of.partition(".")[0] in ("drive1", "drive6", "coupling6") for of in arm.laws.names]
+        arm = arm.with_laws(arm.laws.with_values(size * np.array(of)))
+        found = pk.identify(ARM, measured(commands(60, seed), arm, seed), **UNKNOWN)
+        texts = [each.text for each in found.verdict.said if each.check == "causes"]
+        named += any(name in text and option in text for text in texts)
+    assert named == 3
+
+
 @pytest.mark.parametrize("shared", [0.0, 0.05])
 def test_a_rigid_arm_is_not_said_to_sag(shared: float) -> None:
     for seed in range(2):
         m = measured(commands(24, 20 + seed), built(seed), seed, shared=shared)
         found = pk.identify(ARM, m, effects="auto", **UNKNOWN)
         assert not any(name.startswith("sag") for name in found.free)
-        assert not any("torque of gravity" in text for text in found.verdict.remarks)
+        assert not any(said.check == "sag-lacking" for said in found.verdict.said)
 
 
 def test_nothing_is_taken_unasked() -> None:
@@ -145,7 +182,7 @@ def test_outliers_of_a_rigid_arm_that_sags_are_none() -> None:
 def test_tied_compliances_are_found_and_tell_another_payload() -> None:
     """With masses known, the springs themselves are found."""
     true = built(7)
-    weighed = JointLaws(ARM.axes, ARM.points, ARM.kinds, {}, masses=MASSES, centres=CENTRES)
+    weighed = JointLaws(JointPulls(ARM.axes, ARM.points, ARM.kinds, masses=MASSES, centres=CENTRES))
     arm = ARM.with_laws(weighed)
     m = measured(commands(60, 50), true, 51, SOFT)
     found = pk.identify(arm, m, effects=[pk.Sag((2, 3, 5), tied=True)], **UNKNOWN)
@@ -154,6 +191,42 @@ def test_tied_compliances_are_found_and_tell_another_payload() -> None:
     sigma = np.array([found.parameters[name]["stderr"] for name in names])
     assert (np.abs(values - SOFT[[1, 2, 4]]) < 4 * sigma + 0.05 * SOFT[[1, 2, 4]]).all()
     assert (sigma < 0.2 * SOFT[[1, 2, 4]]).all()
+
+
+def carried(kg: FloatArray, seed: int, true: pk.SerialArm) -> pk.Measurements:
+    """One target under payloads by row, of joints with springs that carry links and payload."""
+    theta = np.tile(commands(len(kg) // 2, seed), (2, 1))
+    at = np.array([450.0, 0.0, 670.0])
+    total = MASSES[5] + kg
+    centre = (MASSES[5] * CENTRES[5] + kg[:, None] * at) / total[:, None]
+    rest = np.empty_like(theta)
+    for i in range(len(kg)):
+        masses, centres = np.append(MASSES[:5], total[i]), np.vstack([CENTRES[:5], centre[i]])
+        rest[i] = at_rest(
+            lambda q, m=masses, c=centres: gravity_torques(true, q, m, c), theta[i : i + 1], SOFT
+        )[0]
+    m = pk.VirtualMachine(true, NOISE, seed=seed).measure(rest, "position", TARGETS[0])
+    return replace(m, actuators=theta, load=pk.Load(kg, centre=(0, 0, 40)).rows(kg.shape))
+
+
+def test_compliances_of_joints_are_found_by_payloads_alone() -> None:
+    """No mass of a link is known: products take up their weight, and another payload is told."""
+    true, names = built(11), [f"compliance{i}" for i in range(2, 7)]
+    m = carried(np.repeat([0.0, 5.0], 40), 1, true)
+    found = pk.identify(ARM, m, effects=[pk.Sag("all"), pk.Elasticity("joint*")])
+    values = np.array([found.parameters[name]["value"] for name in names])
+    sigma = np.array([found.parameters[name]["stderr"] for name in names])
+    assert (np.abs(values - SOFT[1:]) < 4 * sigma + 0.01 * SOFT[1:]).all()
+    assert (sigma[:4] < 0.1 * SOFT[1:5]).all()
+    assert any("compliance1" in each for each in found.unidentifiable)  # nothing turns it
+    held = carried(np.repeat([2.5, 9.0], 20), 2, true)
+    again = pk.identify(ARM, m, effects=[pk.Sag("all"), pk.Elasticity("joint*")], holdout=held)
+    assert again.holdout_rms < 1.3 * np.sqrt(3) * NOISE
+    assert again.verdict.state == "calibrated"
+    alone = pk.identify(ARM, m, effects=[pk.Sag("all")], holdout=held)
+    assert alone.holdout_rms > 10 * again.holdout_rms
+    (said,) = [each for each in alone.verdict.reasons if "residuals follow the loads" in each]
+    assert "--effects 'elasticity=joint*'" in said
 
 
 def test_the_arm_without_laws_is_the_better_of_two() -> None:

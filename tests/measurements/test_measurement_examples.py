@@ -133,7 +133,7 @@ def test_a_text_of_a_workbook_may_be_a_thousand(tmp_path: Path) -> None:
         read_measurements(path)
 
 
-def test_hidden_rows_and_sheets_of_a_workbook_are_said(tmp_path: Path) -> None:
+def test_hidden_rows_columns_and_sheets_of_a_workbook_are_said(tmp_path: Path) -> None:
     openpyxl = pytest.importorskip("openpyxl")
     book = openpyxl.Workbook()
     book.active.title, book.active.sheet_state = "raw", "hidden"
@@ -146,6 +146,8 @@ def test_hidden_rows_and_sheets_of_a_workbook_are_said(tmp_path: Path) -> None:
     shown.row_dimensions[3].hidden = True
     shown.auto_filter.ref = "A1:B4"
     shown.row_dimensions[9].hidden = True  # nothing is there
+    shown.column_dimensions["B"].hidden = True
+    shown.column_dimensions.group("D", "XFD", hidden=True)  # nor there
     book.active = 1
     book.save(tmp_path / "m.xlsx")
     read = read_measurements(tmp_path / "m.xlsx")
@@ -153,6 +155,7 @@ def test_hidden_rows_and_sheets_of_a_workbook_are_said(tmp_path: Path) -> None:
     assert [note.partition(": ")[2] for note in read.notes] == [
         "of the workbook the sheet 'poses' was read, not 'raw' (hidden), 'more'",
         "1 row hidden in the workbook, and read: 3",
+        "1 column hidden in the workbook, and read: B",
     ]
     assert empty.title not in "".join(read.notes)
 

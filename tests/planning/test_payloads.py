@@ -62,6 +62,38 @@ def test_poses_under_one_payload_follow_one_another(robot: pk.Robot) -> None:
     assert weighed.travel <= weighed.travel_unweighted
 
 
+def test_a_plan_under_payloads_finds_compliances_of_an_effect() -> None:
+    """Of a rigid machine as of one that yields by 0, and predicts what a calibration states."""
+    robot = pk.load("hexapod")
+    rigid = plan(robot, (0.0, 80.0), free="offset*", effects=[pk.Elasticity("offset*")])
+    soft = robot.yielding({"offset*": 0.0})
+    stated = plan(soft, (0.0, 80.0), free=["offset*", "compliance.*"])
+    assert rigid.parameters == stated.parameters
+    np.testing.assert_array_equal(rigid.actuators, stated.actuators)
+    with pytest.raises(ValueError, match="expansion follows rows"):
+        plan(robot, (), effects=[pk.Expansion(1e-5)])
+
+
+def test_a_plan_for_an_arm_predicts_what_its_calibration_states() -> None:
+    """Deviations of compliances by payloads, each at half of the poses, against a calibration."""
+    arm = pk.SerialArm(
+        [[0, 0, 1], [0, 1, 0], [0, 1, 0]], [[0, 0, 0], [0, 0, 290], [0, 0, 560]],
+        [450, 0, 630, 0, 0, 0],
+    )  # fmt: skip
+    theta = np.random.default_rng(0).uniform(-1.5, 1.5, (60, arm.n_joints))
+    effects = [pk.Sag(), pk.Elasticity(["joint2", "joint3"])]
+    made = pk.plan_poses(
+        arm, theta, 30, payloads=(0.0, 8.0), effects=effects, noise=0.02, target=[50.0, 30.0, 20.0]
+    )
+    names = list(made.parameters)
+    places = [names.index(name) for name in ("compliance2", "compliance3")]
+    soft = pk.VirtualMachine(arm.yielding({2: 2e-8, 3: 4e-8}), noise=0.02, seed=1)
+    rows = soft.measure(made.actuators, target=[50.0, 30.0, 20.0], load=made.load)
+    found = pk.identify(arm, rows, effects=effects, loss="classical")
+    sure = [found.parameters[names[i]]["stderr"] for i in places]
+    np.testing.assert_allclose(made.stderr[places], sure, rtol=0.2)
+
+
 def test_no_candidate_gives_way_under_a_payload() -> None:
     soft = pk.load("hexapod").yielding({"offset*": 1e-3})
     candidates = pk.sample_poses(soft.rigid, 80, seed=1)
@@ -83,7 +115,7 @@ def test_no_candidate_gives_way_under_a_payload() -> None:
         ("soft", ("5",), "payloads must be several masses"),
         ("soft", (-5.0,), "must not be negative"),
         ("soft", (pk.Load(mass=[1.0, 2.0]),), "load: mass"),
-        ("3r", (5.0,), "is an arm, which has no limbs"),
+        ("3r", (5.0,), "nothing of 3R arm yields: .*joint"),
     ],
 )
 def test_payloads_that_do_not_fit_are_refused(name: str, payloads: Any, message: str) -> None:

@@ -18,6 +18,7 @@ from pkmcal.report.contents import (
     over_the_workspace,
     worst,
 )
+from pkmcal.report.places import in_the_workspace
 
 from ..simulated import hexapod_poses
 
@@ -81,19 +82,19 @@ def test_where_no_stroke_ends_the_workspace_it_is_what_was_measured() -> None:
         belts.inverse(np.pad(places, ((0, 0), (0, 4)))), "position"
     )
     found = pk.identify(belts, measured, free=["base1.x", "base1.y"])
-    predicted = over_the_workspace(found)
-    assert not isinstance(predicted, str)
-    sampled, area = predicted
+    drawn = in_the_workspace(found)
+    assert not isinstance(drawn, str)
+    sampled, area = over_the_workspace(found, drawn)
     assert area is not None and "between those that were measured" in sampled.where
     margin = 2.0  # mm: poses are where the noise says
     for seen in (sampled.positions[:, :2], np.transpose([ends[[0, -1]] for ends in area.values])):
         assert (seen > low - margin).all() and (seen < high + margin).all()
     drives = pk.load("hexapod")
     q = drives.inverse(hexapod_poses(drives, 20, np.random.default_rng(0)))
-    bounded = over_the_workspace(
+    bounded = in_the_workspace(
         pk.identify(drives, pk.VirtualMachine(drives).measure(q), free="offset*")
     )
-    assert not isinstance(bounded, str) and "way to its ends" in bounded[0].where
+    assert not isinstance(bounded, str) and "way to its ends" in bounded.where
 
 
 def test_rows_that_were_not_read_are_not_among_the_worst() -> None:

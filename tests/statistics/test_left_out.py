@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pkmcal.statistics.left_out import left_out
+from pkmcal.statistics.left_out import left_out, residuals_left_out
 from pkmcal.statistics.linear_fit import linear_fit
 
 
@@ -30,6 +30,19 @@ def test_it_is_a_fit_without_the_block(seed):
         np.testing.assert_allclose(
             found.residual[~rest], y[~rest] - jacobian[~rest] @ theta, atol=1e-9
         )
+
+
+@pytest.mark.parametrize(("blocks", "own"), [(4, 0), (4, 2), (20, 0), (60, 0)])
+def test_small_blocks_together_are_each_left_out(blocks, own):
+    """Of more equations than numbers, of fewer, and of one."""
+    fit, jacobian, y, quarter = made(2, own=own)
+    block = quarter if own else np.arange(60) % blocks
+    found = residuals_left_out(fit, block)
+    np.testing.assert_allclose(found, left_out(fit, block).residual, atol=1e-9)
+    for b in range(0 if own else blocks):
+        rest = block != b
+        theta = np.linalg.lstsq(jacobian[rest], y[rest], rcond=None)[0]
+        np.testing.assert_allclose(found[~rest], y[~rest] - jacobian[~rest] @ theta, atol=1e-9)
 
 
 def test_numbers_of_a_block_alone_are_found_from_it():

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 
 from pkmcal.arrays import FloatArray
 from pkmcal.statistics.linear_fit import linear_fit
-from pkmcal.statistics.score_test import score_test
+from pkmcal.statistics.score_test import columns_of, score_test
 
 from .designs import arm, errors, hexapod
 
@@ -28,7 +28,7 @@ def test_it_is_what_least_squares_with_the_numbers_finds() -> None:
         left = y - jacobian @ solved(jacobian, prior)
         cluster = np.arange(30) // 2
         fit = linear_fit(jacobian, left, prior, np.eye(4), cluster, np.arange(30) % 2)
-        found = score_test(fit, columns)
+        found = score_test(fit, columns_of(columns))
         assert found is not None
         both = np.hstack([jacobian, columns])
         whole = solved(both, np.hstack([prior, np.zeros((q, 2))]))
@@ -47,7 +47,7 @@ def test_it_has_the_chance_it_states_whatever_poses_share(shared: float) -> None
         chances = []
         for _ in range(400):
             fit, _ = design.fitted(errors(design, shared, rng))
-            found = score_test(fit, columns)
+            found = score_test(fit, columns_of(columns))
             assert found is not None
             chances.append(found.chance)
         assert 6 <= np.sum(np.array(chances) < 0.05) <= 34
@@ -55,4 +55,23 @@ def test_it_has_the_chance_it_states_whatever_poses_share(shared: float) -> None
 
 def test_what_parameters_take_up_is_not_tested() -> None:
     fit = hexapod(20).fit
-    assert score_test(replace(fit, residual=np.ones(len(fit.residual))), fit.design[:, :2]) is None
+    assert (
+        score_test(replace(fit, residual=np.ones(len(fit.residual))), columns_of(fit.design[:, :2]))
+        is None
+    )
+
+
+def test_columns_in_lots_are_the_columns_as_a_whole() -> None:
+    """And those in other units say the same of what they explain."""
+    fit = hexapod(20, 3).fit
+    rng = np.random.default_rng(0)
+    fit = replace(fit, residual=rng.normal(size=len(fit.residual)))
+    columns = rng.normal(size=(len(fit.residual), 3))
+    whole = score_test(fit, columns_of(columns))
+    units = np.array([1e-3, 1.0, 1e4])
+    lots = [slice(a, a + 7) for a in range(0, len(columns), 7)]
+    other = score_test(fit, lambda: ((rows, columns[rows] * units) for rows in lots))
+    assert whole is not None and other is not None
+    assert_allclose(other.size * units, whole.size, rtol=1e-9)
+    assert_allclose(other.deviation * units, whole.deviation, rtol=1e-9)
+    assert other.chance == pytest.approx(whole.chance)

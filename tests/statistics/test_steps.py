@@ -103,14 +103,45 @@ def test_few_equations_stand_for_the_averages_of_many() -> None:
     y = y + 0.1 * cell * x[:, 0]
     few = few_equations(x, y, np.arange(len(key)), key, cell)
     assert len(few.design) == 8
+    assert few.counts.tolist() == [len(np.unique(key[cell == k])) for k in (0, 1)]
     count = np.bincount(key)
     averaged = np.column_stack([np.bincount(key, each) / count for each in (*x.T, y)])
     first = np.unique(key, return_index=True)[1]
     one = group_test(averaged[:, :3], averaged[:, 3], cell[first] == 1)
-    other = group_test(few.design, few.residual, few.cell == 1, few.count)
+    other = group_test(few.design, few.residual, few.cell == 1, int(few.counts.sum()))
     assert one is not None and other is not None
     assert other.chance == pytest.approx(one.chance, rel=1e-8)
     assert other.apart == pytest.approx(one.apart, rel=1e-12)
+
+
+def test_a_group_of_another_machine_is_told_whatever_its_weights() -> None:
+    """Weights by what common parameters miss: a third of all fits the other group, and no more."""
+    rng = np.random.default_rng(3)
+    x, mine = rng.normal(size=(60, 6)), np.arange(60) < 30
+    y = x @ rng.normal(size=6) * mine + 0.01 * rng.normal(size=60)
+    weight = np.where(mine, 1.0, 100.0)
+    x, y = x * weight[:, None], y * weight
+    few = few_equations(x, y, np.arange(60), np.arange(60), mine.astype(np.intp))
+    plain, tested = group_test(x, y, mine), few.tested(few.cell == 1)
+    assert plain is not None and tested is not None
+    assert tested.chance < 1e-16
+    assert tested.apart < 0.1 < plain.apart
+
+
+@pytest.mark.parametrize("sizes", [(14, 14), (14, 60), (60, 14)])
+@pytest.mark.parametrize("louder", [1.0, 10.0])
+def test_groups_of_unlike_noise_are_called_unlike_as_seldom(
+    sizes: tuple[int, int], louder: float
+) -> None:
+    rng, count = np.random.default_rng(4), sum(sizes)
+    mine = np.arange(count) < sizes[0]
+    x, chances = rng.normal(size=(count, 4)), []
+    for _ in range(600):
+        y = rng.normal(size=count) * np.where(mine, louder, 1.0)
+        few = few_equations(x, y, np.arange(count), np.arange(count), mine.astype(np.intp))
+        chances.append(few.tested(few.cell == 1).chance)  # type: ignore[union-attr]
+    assert np.mean(np.array(chances) < 0.05) < 0.09
+    assert np.mean(np.array(chances) < 1e-3) < 0.006
 
 
 def test_alike_groups_are_called_unlike_as_seldom_as_stated() -> None:

@@ -56,6 +56,7 @@ class Panel {
     this.condition = made('p', side, { className: 'hint' })
     this.platform(side, data)
     this.actuators(side, data)
+    if (data.stiffness) showStiffness(side, data.stiffness)
     const buttons = made('div', side, { className: 'buttons' })
     made('button', buttons, { type: 'button', text: 'Home', onclick: () => { mover.home(); changed(true) } })
     if (data.places) this.places(side, data.places)

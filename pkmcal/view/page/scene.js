@@ -109,7 +109,7 @@ class Scene {
     context.fillStyle = colours.paper
     context.fillRect(0, 0, eye.wide, eye.high)
     this.ground(eye, colours, bodies)
-    if (extra.cloud) this.dots(eye, extra.cloud, colours.cloud, 2)
+    if (extra.cloud) this.dots(eye, extra.cloud, extra.stiffness ? tinted(extra.stiffness, colours.bad) : colours.cloud, extra.stiffness ? 4 : 2)
     const tasks = []
     for (const body of bodies.list) this.plan(eye, body, colours, tasks)
     tasks.sort((a, b) => b.far - a.far)
@@ -212,7 +212,7 @@ class Scene {
   }
 
   dots(eye, points, colour, wide) {
-    for (const p of points) this.dot(this.seen(eye, p), colour, wide)
+    points.forEach((p, k) => this.dot(this.seen(eye, p), Array.isArray(colour) ? colour[k] : colour, wide))
   }
 
   // Numbers first, then the nearer ones; what would cover another moves a line up or down, or goes.

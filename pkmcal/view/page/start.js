@@ -3,9 +3,9 @@ async function start(root, data) {
   const core = await loadedCore(data)
   const mover = data.kind === 'arm' ? new Arm(core, data) : new Mover(core, data)
   const cloud = data.cloud ? await cloudOf(data.cloud) : null
-  const show = { numbers: !data.calibration, frames: true, limits: true, cloud: false, places: true, names: { numbers: 'numbers', frames: 'frames' } }
+  const show = { numbers: !data.calibration, frames: true, limits: true, cloud: Boolean(data.stiffness), places: true, names: { numbers: 'numbers', frames: 'frames' } }
   if (hasCones(data)) show.names.limits = 'joint cones'
-  if (cloud) show.names.cloud = 'workspace'
+  if (cloud) show.names.cloud = data.stiffness ? 'workspace, by stiffness' : 'workspace'
   if (data.places) show.names.places = data.places.name
   const assumed = data.calibration ? await loadedCore(data) : null
   root.replaceChildren()
@@ -19,7 +19,7 @@ async function start(root, data) {
     parts.calibration?.add(bodies)
     return [limits, bodies]
   }
-  const draw = ([, bodies]) => scene.draw(bodies, { cloud: show.cloud ? cloud : null, key: parts.calibration?.key })
+  const draw = ([, bodies]) => scene.draw(bodies, { cloud: show.cloud ? cloud : null, stiffness: data.stiffness?.cloud, key: parts.calibration?.key })
   const redraw = () => { if (parts.panel) draw(looks()) }
   const scene = new Scene(canvas, redraw)
   if (data.map === 'planar' || data.map === 'xy') scene.tilt = 1.1
