@@ -177,6 +177,11 @@ def calls() -> list[Call]:
                 " turning, the mounting and the vertical", measured.tilt,
                 "pose mounting up tilt by_turn by_mounting by_up",
                 ((2,), (2, 3), (2, 3), (2, 3)), {"mounting": "either", "up": "either"}),
+        formula("pixels", "where cameras see corners of boards, with the derivatives by the board's"
+                " twist at the camera, by the lens and by the size of the board, and how far"
+                " before the camera they are", measured.pixel,
+                "board corner lens size seen by_twist by_lens by_size depth",
+                ((2,), (2, 6), (2, 9), (2,), ()), {"lens": "either", "size": "either"}),
         formula("law_drive", "the way of drives without corrections, with its derivatives by"
                 " q, gain, quadratic, spool, buildup, and twice by q", laws.drive,
                 "x way by_x bend", ((), (5,), ())),

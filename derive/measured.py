@@ -136,6 +136,42 @@ def tilt() -> Function:
     return f
 
 
+def pixel() -> Function:
+    """Derive where a camera sees a corner of a board, by five numbers of distortion."""
+    f = Function(
+        "measured_pixel",
+        "where a camera sees a corner of a board; axes of the camera: x right, y down, z forward",
+        "u = fx (x L + 2 p1 x y + p2 (r² + 2 x²)) + cx, L = 1 + k1 r² + k2 r⁴ + k3 r⁶, "
+        "(x, y) = p / p_z, p = pb + Rb (1 + s) X",
+    )
+    _, R, origin = posed(f, "board", "of the board, as the camera has it")
+    corner = f.vector("corner", 3, "X, in axes of the board [mm]")
+    lens = f.vector("lens", 9, "fx fy cx cy [px], k1 k2 p1 p2 k3")
+    size = f.scalar("size", "s, by which the board is larger than stated")
+    fx, fy, cx, cy, k1, k2, p1, p2, k3 = lens
+    arm = f.let("arm", R * corner, "Rb X")
+    p = f.let("p", origin + (1 + size) * arm, "the corner, from the camera")
+    x, y = f.let("x", p[0] / p[2]), f.let("y", p[1] / p[2])
+    r2 = f.let("r2", x**2 + y**2, "r²")
+    L = f.let("L", 1 + r2 * (k1 + r2 * (k2 + r2 * k3)))
+    bent = [
+        f.let("bent_x", x * L + 2 * p1 * x * y + p2 * (r2 + 2 * x**2)),
+        f.let("bent_y", y * L + p1 * (r2 + 2 * y**2) + 2 * p2 * x * y),
+    ]
+    seen = sp.Matrix([fx * bent[0] + cx, fy * bent[1] + cy])
+    by_point = f.let("by_p", f.gradient(seen, p), "∂(u, v)/∂p")
+    f.output("seen", seen, "u, v; (0, 0) is the centre of the first pixel [px]")
+    f.output(
+        "by_twist",
+        by_point * sp.Matrix.hstack(-skew(p), sp.eye(3)),
+        "v + ω × p by the board's turning and velocity at the camera, 2 x 6 row by row",
+    )
+    f.output("by_lens", f.gradient(seen, lens), "∂(u, v)/∂lens, 2 x 9 row by row")
+    f.output("by_size", by_point * arm, "∂(u, v)/∂s")
+    f.output("depth", p[2], "p_z; what is not before the camera is not seen [mm]")
+    return f
+
+
 def functions() -> list[Function]:
     """The emitted functions of what is measured."""
-    return [point(), seen(), distance(), between(), touched(), tilt()]
+    return [point(), seen(), distance(), between(), touched(), tilt(), pixel()]

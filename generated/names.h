@@ -38,6 +38,7 @@ enum { MAP_SPATIAL, MAP_TRANSLATION, MAP_PLANAR, MAP_2TPR2TPS, MAP_SPHERICAL, MA
     "between pose:6 other:6 target:3* -> distance: by_twist:6 by_other:6 by_target:3\n" \
     "touched_points artefact:6* point:3 -> inside:3 by_artefact:3,6 by_point:3,3\n" \
     "tilts pose:6 mounting:3* up:3* -> tilt:2 by_turn:2,3 by_mounting:2,3 by_up:2,3\n" \
+    "pixels board:6 corner:3 lens:9* size:1* -> seen:2 by_twist:2,6 by_lens:2,9 by_size:2 depth:\n" \
     "law_drive x:5 -> way: by_x:5 bend:\n" \
     "law_drive_inverse x:5 -> q:\n" \
     "law_harmonic x:4 -> error: by_x:3 bend:\n" \

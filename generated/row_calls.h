@@ -1,5 +1,5 @@
 /* Generated from derive/calls.py by `python -m derive`; never edited by hand.
- * derivation f2cc784edfe39458
+ * derivation 0cefd233002a3101
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 /* a (n, 6) or (6), b (n, 6) or (6) -> out (n, 6): A followed by B. */
@@ -57,6 +57,14 @@ int CALL(touched_points)(ptrdiff_t n, const double *artefact, ptrdiff_t artefact
 int CALL(tilts)(ptrdiff_t n, const double *pose, const double *mounting, ptrdiff_t mounting_stride,
                 const double *up, ptrdiff_t up_stride, double *tilt, double *by_turn,
                 double *by_mounting, double *by_up);
+
+/* board (n, 6), corner (n, 3), lens (n, 9) or (9), size (n, 1) or (1) -> seen (n, 2), by_twist
+ * (n, 2, 6), by_lens (n, 2, 9), by_size (n, 2), depth (n): where cameras see corners of boards,
+ * with the derivatives by the board's twist at the camera, by the lens and by the size of the
+ * board, and how far before the camera they are. */
+int CALL(pixels)(ptrdiff_t n, const double *board, const double *corner, const double *lens,
+                 ptrdiff_t lens_stride, const double *size, ptrdiff_t size_stride, double *seen,
+                 double *by_twist, double *by_lens, double *by_size, double *depth);
 
 /* x (n, 5) -> way (n), by_x (n, 5), bend (n): the way of drives without corrections, with its
  * derivatives by q, gain, quadratic, spool, buildup, and twice by q. */

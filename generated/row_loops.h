@@ -1,5 +1,5 @@
 /* Generated from derive/calls.py by `python -m derive`; never edited by hand.
- * derivation f2cc784edfe39458
+ * derivation 0cefd233002a3101
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 int CALL(compose)(ptrdiff_t n, const double *a, ptrdiff_t a_stride, const double *b,
@@ -183,6 +183,30 @@ int CALL(tilts)(ptrdiff_t n, const double *pose, const double *mounting, ptrdiff
         scatter_row(lane_by_turn, 6, by_turn, 6, row, count);
         scatter_row(lane_by_mounting, 6, by_mounting, 6, row, count);
         scatter_row(lane_by_up, 6, by_up, 6, row, count);
+    }
+    return 0;
+}
+
+int CALL(pixels)(ptrdiff_t n, const double *board, const double *corner, const double *lens,
+                 ptrdiff_t lens_stride, const double *size, ptrdiff_t size_stride, double *seen,
+                 double *by_twist, double *by_lens, double *by_size, double *depth)
+{
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        real lane_board[6], lane_corner[3], lane_lens[9], lane_size[1], lane_seen[2],
+             lane_by_twist[12], lane_by_lens[18], lane_by_size[2], lane_depth[1];
+        const int count = block_rows(first, n, row);
+        gather_row(board, 6, 6, row, lane_board);
+        gather_row(corner, 3, 3, row, lane_corner);
+        gather_row(lens, lens_stride, 9, row, lane_lens);
+        gather_row(size, size_stride, 1, row, lane_size);
+        FN(measured_pixel)(lane_board, lane_corner, lane_lens, lane_size[0], lane_seen,
+                           lane_by_twist, lane_by_lens, lane_by_size, lane_depth);
+        scatter_row(lane_seen, 2, seen, 2, row, count);
+        scatter_row(lane_by_twist, 12, by_twist, 12, row, count);
+        scatter_row(lane_by_lens, 18, by_lens, 18, row, count);
+        scatter_row(lane_by_size, 2, by_size, 2, row, count);
+        scatter_row(lane_depth, 1, depth, 1, row, count);
     }
     return 0;
 }

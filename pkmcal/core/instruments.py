@@ -85,3 +85,21 @@ def tilts(
     """
     tilt, by_turn, by_mounting, by_up = rows("tilts", pose, mounting, up, isa=isa)
     return tilt, by_turn, by_mounting, by_up
+
+
+def pixels(
+    board: FloatArray,
+    corner: FloatArray,
+    lens: FloatArray,
+    size: FloatArray = _NONE,
+    isa: int | None = None,
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Where cameras see corners (N, 3) of boards at poses (N, 6) in the camera's axes, px.
+
+    `lens` is (9,) or (N, 9): fx fy cx cy k1 k2 p1 p2 k3; `size` is (1,) or (N, 1), by which a board
+    is larger than stated. Returns u, v (N, 2), their derivatives by the board's twist (ω, v) at the
+    camera (N, 2, 6), by the lens (N, 2, 9) and by the size (N, 2), and how far before the camera
+    the corners are, mm (N,).
+    """
+    seen, by_twist, by_lens, by_size, depth = rows("pixels", board, corner, lens, size, isa=isa)
+    return seen, by_twist, by_lens, by_size, depth

@@ -347,19 +347,21 @@ def machine_of(robot: Calibratable) -> Robot:
     return robot
 
 
-def one_mm(robot: Robot, read: FloatArray) -> FloatArray:
+def one_mm(robot: Calibratable, read: FloatArray) -> FloatArray:
     """Deviations (K, n) of what actuators read, where none is known: to be estimated."""
     return np.tile(1.0 / mm_per_unit(robot.actuator_units, robot.length), (len(read), 1))
 
 
-def has_equations(robot: Calibratable, sigmas: Sequence[FloatArray | None]) -> bool:
-    """Whether closures are equations, for these deviations of the actuators."""
-    noisy = any(sigma is not None and bool(sigma.any()) for sigma in sigmas)
+def has_equations(
+    robot: Calibratable, sigmas: Sequence[FloatArray | None], estimated: bool
+) -> bool:
+    """Whether closures are equations, for these deviations of the actuators; see `closures_of`."""
+    noisy = estimated or any(sigma is not None and bool(sigma.any()) for sigma in sigmas)
     return noisy or (isinstance(robot, Robot) and pose_steps.surplus(robot) > 0)
 
 
 def closures_of(
-    robot: Calibratable, read: FloatArray, sigma: FloatArray | None
+    robot: Calibratable, read: FloatArray, sigma: FloatArray | None, estimated: bool
 ) -> ExactActuators | NoisyActuators | FreePoses:
     """What the closures of a machine say, for actuators that read so (K, n).
 
@@ -372,9 +374,13 @@ def closures_of(
     sigma : ndarray (K, n) or None
         Standard deviations of what was read. None: nothing is stated, which is 0 where the
         actuators are as many as the ways to move, and 1 mm, to be estimated, where they are more.
+    estimated : bool
+        Whether they are to be estimated on any machine, for what was read tells them.
     """
+    if sigma is None and estimated:
+        sigma = one_mm(robot, read)
     if isinstance(robot, Robot) and pose_steps.surplus(robot) > 0:
         return FreePoses(robot, read, one_mm(robot, read) if sigma is None else sigma)
-    if sigma is None or not has_equations(robot, [sigma]):
+    if sigma is None or not has_equations(robot, [sigma], estimated):
         return ExactActuators(read)
     return NoisyActuators(read, sigma)

@@ -13,6 +13,7 @@ from pkmcal.effects.effect import Effect
 from pkmcal.estimation.closures import has_equations
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.parameters import KNOWN, Known
+from pkmcal.estimation.pose_table import tells_actuators
 from pkmcal.estimation.runs import runs_apart
 from pkmcal.estimation.sessions import in_sessions, set_names
 from pkmcal.estimation.starts import with_starts
@@ -69,11 +70,14 @@ def informative(machine: Calibratable, datasets: list[FitData]) -> tuple[list[Fi
     sets = [data.measured for data in datasets]
     if unknown_tensions(machine, sets):
         return datasets, 0
-    if has_equations(machine, [measured.actuator_sigma for measured in sets]):
-        return datasets, 0
+    sigmas = [measured.actuator_sigma for measured in sets]
+    equations = has_equations(machine, sigmas, tells_actuators(sets))
     kept, unread = [], 0
     for data in datasets:
         values = data.measured.values.reshape(len(data.measured), -1)
+        if equations and not data.measured.instrument.tells_actuators:
+            kept.append(data)
+            continue
         read = np.asarray(np.isfinite(values).any(axis=1))
         unread += int((~read).sum())
         if read.all():

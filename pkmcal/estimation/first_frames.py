@@ -13,11 +13,11 @@ from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.core import instruments
 from pkmcal.core.poses import compose, invert
 from pkmcal.estimation.evaluation import Evaluation
-from pkmcal.estimation.hand_eye import of_frame_and_tool, of_tool
 from pkmcal.estimation.parameters import Parameters
 from pkmcal.estimation.prediction import Prediction
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.readings.alignment import Sighting
+from pkmcal.readings.hand_eye import of_frame_and_tool, of_tool
 
 Rows = dict[int, IntArray]  # of a frame, in each set
 
@@ -117,10 +117,11 @@ def _with_tool(
                 groups.setdefault(f, []).append((i, some))
     known = [each for each in groups if each is None or not free[each]]
     frame = (known or list(groups))[0]
-    values = np.concatenate([prediction.table.sets[i].values[rows] for i, rows in groups[frame]])
-    pose = np.concatenate(
-        [evaluation.pose[prediction.table.pose_of[i][rows]] for i, rows in groups[frame]]
-    )
+    parts = []
+    for i, rows in groups[frame]:
+        m, at = prediction.table.sets[i], evaluation.pose[prediction.table.pose_of[i]]
+        parts.append((m.instrument.places_seen(m, at)[rows], at[rows]))
+    values, pose = (np.concatenate(each) for each in zip(*parts, strict=True))
     if frame is None:
         return {tool: of_tool(values, pose)}
     if free[frame]:

@@ -51,7 +51,8 @@ class FitData:
     @property
     def framed(self) -> bool:
         """Whether these readings depend on the unknown frame."""
-        return self.unknown_frame and self.measured.instrument.framed
+        instrument = self.measured.instrument
+        return bool(instrument.framed and (self.unknown_frame or not instrument.placed))
 
     @property
     def axis(self) -> IntArray | None:

@@ -238,7 +238,7 @@ class Parameters:
     @property
     def motions(self) -> tuple[int, ...]:
         """The first parameter of each frame and each tool."""
-        numbers = [self.nuisance[key] for key in (FRAME, ("tool", "")) if key in self.nuisance]
+        numbers = [at for key, at in self.nuisance.items() if key == FRAME or key[0] == "tool"]
         return tuple(np.flatnonzero(np.isin(self.number_of, numbers)).tolist())
 
     def columns_of(self, datasets: Sequence[FitData]) -> tuple[IntArray, tuple[IntArray, ...]]:

@@ -20,6 +20,7 @@ from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.tension import filled_tension
 from pkmcal.statistics.linear_fit import numbered
 
+_ENOUGH = 8  # rows of a pose, of two numbers each, from which they tell how actuators scatter
 CHANCE = 3  # rows of a set that may equal those of another one by coarse digits alone
 
 
@@ -48,6 +49,8 @@ class PoseTable:
         What the actuators read at each pose.
     actuator_sigma : ndarray (K, n) or None
         Its stated deviations.
+    estimated : bool
+        Whether these are not stated, and what was read tells them: `tells_actuators`.
     state : DriveState
         From where the actuators came, and the tension of what they drive, (K, n) each.
     cells : Cells or None
@@ -70,6 +73,7 @@ class PoseTable:
     other_of: tuple[IntArray | None, ...]
     actuators: FloatArray
     actuator_sigma: FloatArray | None
+    estimated: bool
     state: DriveState
     cells: Cells | None
     columns: IntArray
@@ -133,6 +137,7 @@ def pose_table(datasets: Sequence[FitData], parameters: Parameters) -> PoseTable
         other_of=tuple(None if m.other is None else next(there) for m in sets),
         actuators=of_pose["actuators"],
         actuator_sigma=of_pose.get("sigma"),
+        estimated=tells_actuators(sets),
         state=DriveState(of_pose.get("approach"), tension, of_pose.get("load")),
         cells=of_cells,
         columns=columns,
@@ -141,6 +146,18 @@ def pose_table(datasets: Sequence[FitData], parameters: Parameters) -> PoseTable
         machine_of_pose=machine[first],
         command_of_pose=command_of_pose,
     )
+
+
+def tells_actuators(sets: Sequence[Measurements]) -> bool:
+    """Whether what was read tells how well actuators were, which nobody has stated.
+
+    Pictures of many corners are read better than machines move to the same pose.
+    """
+    telling = [m for m in sets if m.instrument.tells_actuators]
+    if not telling or any(m.actuator_sigma is not None for m in sets):
+        return False
+    read = sum(int(np.isfinite(m.values).all(axis=1).sum()) for m in telling)
+    return read >= _ENOUGH * sum(len(np.unique(m.actuators, axis=0)) for m in telling)
 
 
 def _again(
@@ -218,6 +235,7 @@ def _commands(
                 *(m.other for m in sets if m.other is not None),
             ]
         ),
+        "picture": _pictures(sets, sources),
         "sigma": np.concatenate(noises) if noises else None,
         "approach": approach,
         "tension": tension if cells is None else _blank(cells.read),
@@ -225,6 +243,17 @@ def _commands(
         "load": load,
     }
     return {name: part for name, part in given.items() if part is not None}
+
+
+def _pictures(sets: Sequence[Measurements], sources: Sequence[Measurements]) -> FloatArray | None:
+    """Number of the picture of each row (N, 1): no two are at one pose, wherever actuators read.
+
+    None where no set of pictures says which rows are of one.
+    """
+    if not any(m.instrument.tells_actuators and m.group is not None for m in sets):
+        return None
+    numbers = [np.full(len(m), -1) if m.group is None else m.group for m in sources]
+    return np.concatenate(numbers).astype(np.float64)[:, None]
 
 
 def _blank(tension: FloatArray) -> FloatArray:

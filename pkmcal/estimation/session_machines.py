@@ -218,7 +218,7 @@ def machines_of(robot: Calibratable, table: PoseTable) -> Machines:
     pairs = zip(_apart(table.actuators, rows), sigmas, strict=True)
     closures: tuple[Closures, ...]
     if cells is None:
-        closures = tuple(closures_of(robot, *pair) for pair in pairs)
+        closures = tuple(closures_of(robot, *pair, table.estimated) for pair in pairs)
     else:
         closures = tuple(
             tensioned_poses(robot, *pair, cells.of(own))

@@ -53,7 +53,8 @@ _SYNONYMS: dict[str, str] = {
     "distance": "dist|length measured|measured length|measured distance|ball bar length",
     "sigma": "std|stdev|stddev|std dev|standard deviation|sigma xyz",
     "group": "pose|pose id|pose no|pose nr|pose number|pose name|configuration|config|pos|pos id"
-    "|pos no|pos nr|pos number|position id|position no|position nr|position number|position name",
+    "|pos no|pos nr|pos number|position id|position no|position nr|position number|position name"
+    "|image|image name|picture",
     "run": "run id|run no|run number|run name",
     "tilt1": "tilt 1|inclination 1|inclinometer 1",
     "tilt2": "tilt 2|inclination 2|inclinometer 2",

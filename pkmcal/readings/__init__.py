@@ -4,6 +4,8 @@ from pkmcal.readings.alignment import Sighting as Sighting
 from pkmcal.readings.alignment import frame_of_points as frame_of_points
 from pkmcal.readings.alignment import frame_of_poses as frame_of_poses
 from pkmcal.readings.angles import Angle as Angle
+from pkmcal.readings.boards import Board as Board
+from pkmcal.readings.camera import Camera as Camera
 from pkmcal.readings.closure import Closure as Closure
 from pkmcal.readings.distances import Between as Between
 from pkmcal.readings.distances import Distance as Distance

@@ -44,6 +44,10 @@ class Measured(Protocol):
         """Their names."""
 
     @property
+    def group(self) -> Int64Array | None:
+        """Which rows are repeats of one pose, or of one picture."""
+
+    @property
     def drive_state(self) -> DriveState:
         """From where actuators came, and the tension of what they drive."""
 

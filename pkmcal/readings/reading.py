@@ -157,6 +157,12 @@ class Reading:
         The first of three components that are an orientation and differ by a rotation vector.
     framed : bool
         Whether the readings are in the frame of an instrument.
+    placed : bool
+        Whether it may be known where the instrument stands and what is mounted on the platform for
+        it; if not, frame and tool are always found.
+    tells_actuators : bool
+        Whether readings of one pose are so many and so precise that they tell how well the
+        actuators were read, which is then estimated where it is not stated.
     frame_order : int
         Of readings in one frame, whose place that frame where a search begins: the least number's.
     is_place : bool
@@ -189,6 +195,8 @@ class Reading:
     components: ClassVar[Components] = ()
     turning: ClassVar[int | None] = None
     framed: ClassVar[bool] = False
+    placed: ClassVar[bool] = True
+    tells_actuators: ClassVar[bool] = False
     frame_order: ClassVar[int] = 9
     is_place: ClassVar[bool] = False
     point: ClassVar[Literal["platform", "base", ""]] = ""
@@ -233,6 +241,13 @@ class Reading:
         By default where the base is, with its axes.
         """
         return np.zeros(6), {}
+
+    def places_seen(self, m: Measured, pose: FloatArray) -> FloatArray:
+        """Pose (N, 6) of a tool in the instrument's frame, of rows that show it; else NaN.
+
+        `pose` (N, 6) are those of the nominal machine. Of readings that depend on a tool.
+        """
+        return m.values
 
     def follows_pose(self, machine: Any) -> bool:
         """Whether it follows from one pose of the platform, wherever the actuators are."""

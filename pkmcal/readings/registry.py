@@ -7,6 +7,7 @@ from typing import Literal, cast
 from pkmcal.arguments import shown, word
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.readings.angles import Angle
+from pkmcal.readings.camera import Camera
 from pkmcal.readings.closure import Closure
 from pkmcal.readings.distances import Between, Distance, RelativeDistance
 from pkmcal.readings.points import Height, Position
@@ -17,11 +18,13 @@ from pkmcal.readings.turnings import Orientation, Pose, Tilt
 Kind = Literal[
     "pose", "position", "height", "distance", "closure",
     "between", "relative-distance", "orientation", "tilt", "angle", "touch", "touch-distance",
+    "pixel",
 ]  # fmt: skip
 
 _EVERY: tuple[Reading, ...] = (
     Pose(), Position(), Height(), Distance(), Closure(), Between(), RelativeDistance(),
     Orientation(), Tilt(), Angle(), Touch(), TouchDistance(),
+    Camera(),
 )  # fmt: skip
 KINDS: dict[Kind, Reading] = {cast(Kind, each.name): each for each in _EVERY}
 

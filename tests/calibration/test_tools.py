@@ -12,11 +12,11 @@ from pkmcal.arrays import FloatArray
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.free_parameters import parameters
-from pkmcal.estimation.hand_eye import of_frame_and_tool, of_tool
 from pkmcal.estimation.parameters import Asked
 from pkmcal.estimation.starts import with_starts
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
+from pkmcal.readings.hand_eye import of_frame_and_tool, of_tool
 
 from ..simulated import hexapod_poses
 

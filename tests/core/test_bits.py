@@ -94,6 +94,13 @@ def tilts(isa: int, part: slice) -> list[np.ndarray]:
     return [*own, *instruments.tilts(POSES[part], OTHERS[0, 3:].copy(), up[0], isa)]
 
 
+def pixels(isa: int, part: slice) -> list[np.ndarray]:
+    lens = np.tile([3478.0, 3470, 1200, 1000, -0.1, 0.08, 1e-3, -5e-4, 0.02], (ROWS, 1))
+    size = POINTS[:, :1] * 1e-5
+    own = instruments.pixels(POSES[part], POINTS[part], lens[part], size[part], isa)
+    return [*own, *instruments.pixels(POSES[part], POINTS[part], lens[0], isa=isa)]
+
+
 def closure_cost(isa: int, part: slice) -> list[np.ndarray]:
     robot = pk.load("rotary-delta")
     robot.machine.isa = isa
@@ -239,6 +246,7 @@ CASES: dict[str, Case] = {
     "between": between,
     "touched_points": touched_points,
     "tilts": tilts,
+    "pixels": pixels,
     "pulley": pulley,
     "strand": strand,
     "tpr2tps_lengths": lambda isa, part: closed_forms(isa, part, tpr2tps_lengths, (4,)),

@@ -150,6 +150,35 @@ def test_a_point_seen_from_a_frame_follows_point_and_frame() -> None:
     )
 
 
+def test_a_camera_sees_a_corner_by_its_lens() -> None:
+    R, origin, places = pose("board")
+    X, of_corner = vector("corner")
+    lens, size = entries("lens", 9), sp.Symbol("size", real=True)
+    places |= of_corner | {x: rational() for x in (*lens, size)}
+    fx, fy, cx, cy, k1, k2, p1, p2, k3 = lens
+
+    def seen(p: sp.Matrix) -> sp.Matrix:
+        x, y = p[0] / p[2], p[1] / p[2]
+        r = sp.sqrt(x**2 + y**2)
+        radial = 1 + k1 * r**2 + k2 * r**4 + k3 * r**6
+        return sp.Matrix([
+            fx * (x * radial + 2 * p1 * x * y + p2 * (r**2 + 2 * x**2)) + cx,
+            fy * (y * radial + p1 * (r**2 + 2 * y**2) + 2 * p2 * x * y) + cy,
+        ])  # fmt: skip
+
+    p = origin + (1 + places[size]) * R * X
+    moved = sp.Matrix(sp.symbols("m0:3", real=True))
+    at_rest = places | dict(zip(moved, p, strict=True))
+    u_v, by_point = seen(moved), seen(moved).jacobian(moved).subs(at_rest)
+    assert (value("measured_pixel", "seen", places) - u_v.subs(at_rest)).is_zero_matrix
+    by_lens = value("measured_pixel", "by_lens", places).reshape(2, 9)
+    assert (by_lens - u_v.jacobian(lens).subs(at_rest)).is_zero_matrix
+    by_twist = value("measured_pixel", "by_twist", places).reshape(2, 6)
+    assert (by_twist * TWIST - by_point * (V + skew(W) * p)).is_zero_matrix
+    assert (value("measured_pixel", "by_size", places) - by_point * R * X).is_zero_matrix
+    assert value("measured_pixel", "depth", places)[0] == p[2]
+
+
 def test_a_twist_is_carried_from_the_machines_own_pose_to_the_users() -> None:
     A, _, places = pose("a")
     R, _, of_pose = pose("b")

@@ -389,6 +389,8 @@ static void of_rows(ptrdiff_t n, unsigned strange, int isas)
     EACH_ISA(between, n, a, b, c, three, D(0, n), D(1, 6 * n), D(2, 6 * n), D(3, 3 * n));
     EACH_ISA(touched_points, n, a, six, b, D(0, 3 * n), D(1, 18 * n), D(2, 9 * n));
     EACH_ISA(tilts, n, a, b, three, c, 3 - three, D(0, 2 * n), D(1, 6 * n), D(2, 6 * n), D(3, 6 * n));
+    EACH_ISA(pixels, n, a, b, motion, three * 3, c, three / 3, D(0, 2 * n), D(1, 12 * n), D(2, 18 * n),
+             D(3, 2 * n), D(4, n));
     EACH_ISA(law_drive, n, a, D(0, n), D(1, 5 * n), D(2, n));
     EACH_ISA(law_drive_inverse, n, a, D(0, n));
     EACH_ISA(law_harmonic, n, a, D(0, n), D(1, 3 * n), D(2, n));

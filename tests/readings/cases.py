@@ -12,6 +12,8 @@ import pkmcal as pk
 from pkmcal.readings import (
     Angle,
     Between,
+    Board,
+    Camera,
     Closure,
     Distance,
     Height,
@@ -48,6 +50,8 @@ class Case:
     unknown: Mapping[str, str] = field(default_factory=dict)
     machine: str = "hexapod"
     own: Reading | None = None  # what has to be handed to read_measurements
+    rows: int = ROWS  # that tell all that is unknown
+    frame: tuple[float, ...] = (400, -200, 90, 0.4, -0.7, 2.0)  # in which derivatives are compared
 
     def measured(self, robot: pk.Robot, rows: int, seed: int, noise: float) -> pk.Measurements:
         """Rows of a machine."""
@@ -98,6 +102,29 @@ def touches(artefact: str) -> Draw:
     return draw
 
 
+BOARD = Board.chessboard(4, 3, 40)
+LENS = {"fx": 3000.0, "fy": 2990.0, "cx": 1220.0, "cy": 1020.0, "k1": -0.1, "k2": 0.08, "p1": 1e-3}
+STANDS = {
+    "base": {"stands": [-60, 80, 2300, 3.0, 0.1, 0.2], "carried": [-70, -40, 60, 0.05, -0.03, 0.1]},
+    "platform": {
+        "stands": [-30, 50, -2200, 0.05, 0.1, 0.3], "carried": [10, -15, 60, -0.03, 0.05, 0.6]
+    },
+}  # fmt: skip
+LAID = {"base": (300, -200, 1900, 2.8, 0.4, 2), "platform": (200, -200, -1700, 0.3, -0.2, 2)}
+
+
+def pictures(on: str) -> Draw:
+    """Of a board on the platform, or by a camera there."""
+
+    def draw(robot: pk.Robot, rows: int, rng: np.random.Generator) -> Drawn:
+        count = -(-rows // len(BOARD.ids))
+        camera = Camera(on=on, **LENS, **STANDS[on])  # type: ignore[arg-type]
+        q, seeing = camera.seeing(robot.inverse(hexapod_poses(robot, count, rng)), BOARD)
+        return q[:rows], seeing.select(np.arange(rows), False)
+
+    return draw
+
+
 def runs(rows: int) -> np.ndarray:
     return NAMES[np.arange(rows) % 3]
 
@@ -116,6 +143,7 @@ CASES = (
     Case("tilt", at_poses(lambda _: Tilt(MOUNTED))),
     Case("angle", joint, machine="agile-eye"),
     *(Case(f"touch {artefact}", touches(artefact), TIP) for artefact in TOUCHES),
+    *(Case(f"pixel {on}", pictures(on), rows=300, frame=frame) for on, frame in LAID.items()),
     Case("loop", at_poses(lambda n: Loop(runs(n))), TIP, {"target": "unknown"}, own=Loop()),
     Case("spot", at_poses(lambda _: Spot()), TIP, own=Spot()),
 )

@@ -1,0 +1,233 @@
+"""Where boards are before a camera, from the pixels of their corners alone.
+
+A flat board that is small in its picture has two places at which its corners are seen nearly
+alike, mirrored at the plane across the line of sight. Which of them it is only several pictures
+together tell: both are found here.
+
+Own code: a table of pixels is enough to calibrate a machine, without a library of pictures.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.core import instruments, screws
+from pkmcal.readings import orientation
+from pkmcal.readings.alignment import nearest_rotations
+
+_UNBENDING = 20  # rounds of undoing the distortion
+_STEPS = 30  # of Levenberg and Marquardt
+_SMALL = 1e-10  # step, as a share of the distance and in rad, at which a place is found
+_SAME = 1e-4  # turning between two places, rad, below which they are one
+_FLAT = 1e-6  # share of a board's size by which its corners may stand off a plane
+
+
+@dataclass(frozen=True, eq=False)
+class BoardPoses:
+    """Of each of P pictures the places of the board, best first.
+
+    Attributes
+    ----------
+    pose : ndarray (P, 2, 6)
+        Of the board in axes of the camera, mm and rad; the second is NaN where there is but one.
+    rms : ndarray (P, 2)
+        How far off the corners are, px.
+    """
+
+    pose: FloatArray
+    rms: FloatArray
+
+
+def board_poses(
+    corner: FloatArray, pixel: FloatArray, lens: FloatArray, picture: IntArray
+) -> BoardPoses:
+    """Find the places of boards.
+
+    Parameters
+    ----------
+    corner : ndarray (N, 3)
+        In axes of the board, mm.
+    pixel : ndarray (N, 2)
+        Where they are seen.
+    lens : ndarray (N, 9) or (9,)
+        fx fy cx cy k1 k2 p1 p2 k3.
+    picture : ndarray of int (N,)
+        Which picture each is of, 0 … P - 1. Four corners of a flat board, or six, are needed.
+    """
+    lens = np.broadcast_to(lens, (len(pixel), 9)).copy()
+    found = [
+        _refined(guess, corner, pixel, lens, picture)
+        for guess in _guessed(corner, unbent(pixel, lens), picture)
+    ]
+    pose, rms = (np.stack(each, axis=1) for each in zip(*found, strict=True))
+    turn = orientation.between(pose[:, 1, 3:], pose[:, 0, 3:])
+    swap = rms[:, 1] < rms[:, 0]
+    pose[swap], rms[swap] = pose[swap, ::-1], rms[swap, ::-1]
+    same = ~(np.linalg.norm(turn, axis=1) > _SAME)
+    pose[same, 1], rms[same, 1] = np.nan, np.nan
+    return BoardPoses(pose, rms)
+
+
+def unbent(pixel: FloatArray, lens: FloatArray) -> FloatArray:
+    """Directions x/z, y/z (N, 2) of pixels (N, 2): the distortion undone; NaN where it folds."""
+    bent = (pixel - lens[:, 2:4]) / lens[:, :2]
+    corner, level = np.zeros((len(pixel), 3)), np.zeros((len(pixel), 6))
+    found: FloatArray = bent.copy()
+    for _ in range(_UNBENDING):
+        level[:, :2], level[:, 2] = found, 1.0
+        seen, by_twist, *_ = instruments.pixels(level, corner, lens)
+        off = seen - pixel
+        found = found - np.linalg.solve(by_twist[:, :, 3:5], off[:, :, None])[:, :, 0]
+    found[~(np.abs(off).max(axis=1) < 1e-6 * lens[:, 0])] = np.nan
+    return found
+
+
+def _guessed(
+    corner: FloatArray, direction: FloatArray, picture: IntArray
+) -> tuple[FloatArray, FloatArray]:
+    """Two places (P, 6) each to search from; of a board that is not flat they are one."""
+    middle = corner.mean(axis=0)
+    axes = np.linalg.svd(corner - middle, full_matrices=False)[2]
+    axes[2] *= np.sign(np.linalg.det(axes))
+    own = (corner - middle) @ axes.T  # the board from its middle, the third axis across it
+    size = float(np.abs(own).max())
+    if float(np.abs(own[:, 2]).max()) < _FLAT * size:
+        turns, place = _of_flat(_projection(own[:, :2] / size, direction, picture), size)
+    else:
+        projection = _projection(own / size, direction, picture)
+        scale = np.cbrt(np.abs(np.linalg.det(projection[:, :, :3])))[:, None]
+        turns = [nearest_rotations(projection[:, :, :3] / scale[:, None])] * 2
+        place = projection[:, :, 3] * size / scale
+    first, second = (_poses(turn @ axes, place - turn @ (axes @ middle)) for turn in turns)
+    return first, second
+
+
+def _projection(point: FloatArray, direction: FloatArray, picture: IntArray) -> FloatArray:
+    """Matrices (P, 3, w + 1) that take points (N, w) with a 1 behind to directions, but for size.
+
+    Directions are counted from the middle of their picture in units of its extent, without which
+    the smallest eigenvector of the squares is off where a board is small.
+    """
+    count = np.bincount(picture)[:, None]
+    middle = _summed(direction, picture) / count
+    off = direction - middle[picture]
+    extent = np.sqrt(_summed(off**2, picture).sum(axis=1, keepdims=True) / count)
+    off /= extent[picture]
+    point = np.column_stack([point, np.ones(len(point))])
+    width = point.shape[1]
+    rows = np.zeros((len(point), 2, 3 * width))
+    for i in range(2):
+        rows[:, i, i * width : (i + 1) * width] = point
+        rows[:, i, 2 * width :] = -off[:, i, None] * point
+    _, vectors = np.linalg.eigh(_summed(rows.transpose(0, 2, 1) @ rows, picture))
+    found = vectors[:, :, 0].reshape(-1, 3, width)
+    found[:, :2] *= extent[:, :, None]
+    found[:, :2] += middle[:, :, None] * found[:, 2:]
+    before: FloatArray = found * np.where(found[:, 2:, -1:] < 0, -1.0, 1.0)
+    return before
+
+
+def _of_flat(plane: FloatArray, size: float) -> tuple[list[FloatArray], FloatArray]:
+    """Both turnings (P, 3, 3) of flat boards and their middle (P, 3), by how the middle is seen.
+
+    The derivative of the projection at the middle of the board is that of an affine camera along
+    the line of sight, which two turnings fulfil (T. Collins, A. Bartoli, Infinitesimal plane-based
+    pose estimation, International Journal of Computer Vision 109 (2014) 252-286).
+    """
+    plane = plane / plane[:, 2:, 2:]
+    middle = plane[:, :2, 2]
+    change = (plane[:, :2, :2] - middle[:, :, None] * plane[:, 2:, :2]) / size
+    sight = np.column_stack([middle, np.ones(len(middle))])
+    to_sight = _turned_to(sight / np.linalg.norm(sight, axis=1, keepdims=True))
+    across = to_sight[:, :2, :2] - middle[:, :, None] * to_sight[:, 2:, :2]
+    seen = np.linalg.solve(across, change)
+    near = np.linalg.norm(seen, ord=2, axis=(1, 2))  # 1 / depth
+    columns = seen / near[:, None, None]
+    rest = np.eye(2) - columns.transpose(0, 2, 1) @ columns
+    tilt = np.sqrt(np.maximum(np.einsum("pii->pi", rest), 0.0))
+    tilt[:, 1] *= np.where(rest[:, 0, 1] < 0, -1.0, 1.0)
+    turns = []
+    for side in (1.0, -1.0):
+        two = np.concatenate([columns, side * tilt[:, None]], axis=1)
+        third = np.cross(two[:, :, 0], two[:, :, 1])[:, :, None]
+        turns.append(nearest_rotations(to_sight @ np.concatenate([two, third], axis=2)))
+    return turns, sight / near[:, None]
+
+
+def _turned_to(directions: FloatArray) -> FloatArray:
+    """The shortest turnings (P, 3, 3) that take z to unit vectors (P, 3)."""
+    axis = np.cross([0.0, 0.0, 1.0], directions)
+    cosine = directions[:, 2]
+    angle = np.arctan2(np.linalg.norm(axis, axis=1), cosine)
+    scale = np.where(angle > 0, angle / np.where(angle > 0, np.sin(angle), 1.0), 1.0)
+    twist = np.hstack([axis * scale[:, None], np.zeros_like(axis)])
+    turned: FloatArray = screws.exp(twist).reshape(-1, 4, 4)[:, :3, :3]
+    return turned
+
+
+def _poses(turn: FloatArray, place: FloatArray) -> FloatArray:
+    """Poses (P, 6) of turnings (P, 3, 3) and places (P, 3)."""
+    motion = np.tile(np.eye(4), (len(turn), 1, 1))
+    motion[:, :3, :3], motion[:, :3, 3] = turn, place
+    return screws.pose(motion.reshape(-1, 16))
+
+
+def _refined(
+    pose: FloatArray, corner: FloatArray, pixel: FloatArray, lens: FloatArray, picture: IntArray
+) -> tuple[FloatArray, FloatArray]:
+    """Places (P, 6) at which the squares of what corners are off are least, and their rms, px."""
+    damping = np.full(len(pose), 1e-6)
+    cost, normal, pull = _equations(pose, corner, pixel, lens, picture)
+    moving = np.isfinite(cost)
+    for _ in range(_STEPS):
+        diagonal = np.einsum("pii->pi", normal)
+        damped = normal + damping[:, None, None] * (np.eye(6) * diagonal[:, None])
+        damped[~moving] = np.eye(6)
+        step = np.where(moving[:, None], np.linalg.solve(damped, pull[:, :, None])[:, :, 0], 0.0)
+        trial = _moved(pose, step)
+        new = _equations(trial, corner, pixel, lens, picture)
+        better = moving & (new[0] <= cost)
+        pose[better] = trial[better]
+        for now, then in zip((cost, normal, pull), new, strict=True):
+            now[better] = then[better]
+        damping = np.where(better, damping * 0.1, damping * 10.0)
+        small = np.abs(step[:, :3]).max(axis=1) < _SMALL
+        moving &= ~(small | (damping > 1e12))
+        if not moving.any():
+            break
+    count = np.bincount(picture, minlength=len(pose))
+    return pose, np.sqrt(cost / count)
+
+
+def _equations(
+    pose: FloatArray, corner: FloatArray, pixel: FloatArray, lens: FloatArray, picture: IntArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Sum of squares (P,), normal matrix (P, 6, 6) and right side (P, 6) by the board's twist.
+
+    Infinite where a corner is not before the camera.
+    """
+    at = np.ascontiguousarray(pose[picture])
+    seen, by_twist, _, _, depth = instruments.pixels(at, corner, lens)
+    seen[~(depth > 0)] = np.inf
+    off = pixel - seen
+    with np.errstate(invalid="ignore"):
+        squares = _summed((off**2).sum(axis=1), picture)
+        normal = _summed(by_twist.transpose(0, 2, 1) @ by_twist, picture)
+        pull = _summed((by_twist.transpose(0, 2, 1) @ off[:, :, None])[:, :, 0], picture)
+    return np.where(np.isfinite(squares), squares, np.inf), normal, pull
+
+
+def _moved(pose: FloatArray, twist: FloatArray) -> FloatArray:
+    """Poses (P, 6) after small twists (P, 6) at the camera."""
+    moved = screws.exp(np.ascontiguousarray(twist)).reshape(-1, 4, 4) @ screws.frames(pose)
+    return screws.pose(moved.reshape(-1, 16))
+
+
+def _summed(rows: FloatArray, picture: IntArray) -> FloatArray:
+    """Sums (P, ...) of the rows of each picture."""
+    total = np.zeros((int(picture.max()) + 1, *rows.shape[1:]))
+    np.add.at(total, picture, rows)
+    return total

@@ -1,0 +1,401 @@
+"""A camera that sees a board: the pixels of its corners, two numbers each.
+
+The camera stands and the board is on the platform, or the camera is on the platform and the board
+stands. Either way what is seen follows from one chain, that of a pose reading: F P T, the base in
+the frame of what stands, the platform's pose, what is mounted on the platform. Neither F nor T is
+ever known; both are found.
+
+A picture of many corners tells the pose better than the actuators set it: what drives and joints
+scatter is then no noise of the corners, and is estimated beside it (`tells_actuators`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from os import PathLike
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pkmcal.arguments import word
+from pkmcal.arrays import FloatArray, IntArray, as_rows
+from pkmcal.core import instruments, screws
+from pkmcal.exceptions import ArgumentError
+from pkmcal.files.csv_table import Table
+from pkmcal.readings import orientation, rows
+from pkmcal.readings.board_poses import board_poses, unbent
+from pkmcal.readings.boards import Board
+from pkmcal.readings.lens_files import read_lens
+from pkmcal.readings.measured import InFit, Measured
+from pkmcal.readings.reading import At, Predicted, Reading, Sets, Solve
+from pkmcal.readings.seen_places import in_agreement
+from pkmcal.readings.unknowns import PLACE, Dependence, Found, Numbers, Start, always
+
+LENS = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
+_UNITS = ("px", "px", "px", "px", "1", "1", "1", "1", "1")
+_FOUND: Mapping[str, tuple[int, ...]] = {"none": (), "focal": (0, 1, 2, 3), "all": tuple(range(8))}
+_NOWHERE = np.zeros(6)
+_NO_SIZE = np.zeros(1)
+_FEWEST = 4  # corners of a picture that tell where a flat board is; of another one 6
+_LEAST = 1e-9  # of what a number of the lens moves pixels by, where it moves none
+
+
+@dataclass(frozen=True, eq=False)
+class Camera(Reading):
+    """Pixels of the corners of a board, a row for each corner: u right, v down.
+
+    (0, 0) is the centre of the first pixel. Rows of one `group` are of one picture, or where none
+    is stated rows at the same actuators.
+
+    Attributes
+    ----------
+    corner : (3,) or (N, 3) array
+        The corner of each row in axes of its board, mm; see `Board.at`.
+    on : {"base", "platform"}
+        What the camera is fixed to; the board is on the other. On the base the unknown ``frame`` is
+        the base in axes of the camera (z forward, x right, y down), ``tool`` the board on the
+        platform; on the platform ``frame`` is the base in axes of the board, ``tool`` the camera.
+    fx, fy, cx, cy : float
+        Focal lengths and principal point, px.
+    k1, k2, p1, p2, k3 : float
+        Distortion, as OpenCV has it.
+    width, height : int
+        Of the pictures, px; 0: not known. A simulated camera sees nothing beyond them.
+    lens : {"none", "focal", "all"}
+        What of the lens is to be found beside the machine, from these values on: "focal" is fx fy
+        cx cy, "all" k1 k2 p1 p2 as well: ``lens.fx`` …. State a prior where it is known roughly.
+    find_size : bool
+        Whether the board may be larger than stated, by ``board.size`` (0.001: by 0.1 %).
+    stands, carried : (6,) array
+        Of a simulated camera: the true ``frame`` and ``tool``.
+
+    Examples
+    --------
+    >>> import pkmcal as pk
+    >>> robot = pk.load("hexapod")
+    >>> board = pk.readings.Board.chessboard(5, 4, square=30)
+    >>> stands = [0, 0, 2500, 3, 0, 0]
+    >>> camera = pk.readings.Camera(fx=3000, fy=3000, cx=1200, cy=1000, stands=stands)
+    >>> q, seeing = camera.seeing(robot.inverse([[0, 0, 850, 0, 0, 0]]), board)
+    >>> pk.VirtualMachine(robot, 0.0).measure(q, seeing).values[0].round(3)
+    array([1200., 1000.])
+    """
+
+    corner: ArrayLike | None = None
+    on: Literal["base", "platform"] = "base"
+    fx: float = 0.0
+    fy: float = 0.0
+    cx: float = 0.0
+    cy: float = 0.0
+    k1: float = 0.0
+    k2: float = 0.0
+    p1: float = 0.0
+    p2: float = 0.0
+    k3: float = 0.0
+    width: int = 0
+    height: int = 0
+    lens: Literal["none", "focal", "all"] = "none"
+    find_size: bool = False
+    board: Board | None = None
+    stands: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    carried: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+    name = "pixel"
+    components = (("u", "px"), ("v", "px"))
+    framed = True
+    placed: ClassVar[bool] = False
+    tells_actuators: ClassVar[bool] = True
+    frame_order: ClassVar[int] = 5
+    own_points = ("corner",)
+    truth = ("stands", "carried")
+    stated = ("board",)
+
+    @staticmethod
+    def from_file(path: str | PathLike[str], **others: Any) -> Camera:
+        """The camera of a lens file: YAML or JSON of OpenCV, or ``camera_info`` of ROS.
+
+        Parameters
+        ----------
+        path : str or path
+            The file.
+        **others
+            Other attributes.
+
+        Raises
+        ------
+        ValueError
+            Not such a file, or a lens that nine numbers do not describe.
+        """
+        return Camera(**{**read_lens(path), **others})
+
+    def seeing(self, q: ArrayLike, board: Board) -> tuple[FloatArray, Camera]:
+        """Actuators (N, n) and the camera for pictures that show a whole board.
+
+        Parameters
+        ----------
+        q : (P, n) array
+            Actuators of each picture, mm or rad.
+        board : Board
+            What it sees there.
+        """
+        pictures = np.atleast_2d(rows.numbers("q", q))
+        count = len(board.ids)
+        corner = np.tile(board.places, (len(pictures), 1))
+        return np.repeat(pictures, count, axis=0), self.with_fields({"corner": corner})
+
+    # the model ------------------------------------------------------------------------------------
+
+    def predict(
+        self,
+        at: At,
+        tool: FloatArray = _NOWHERE,
+        tool_origin: FloatArray = _NOWHERE,
+        corner: FloatArray | None = None,
+        lens: FloatArray | None = None,
+        size: FloatArray = _NO_SIZE,
+        **numbers: FloatArray,
+    ) -> Predicted:
+        """Pixels of corners with a board, or camera, at `tool` (N, 6) from `tool_origin` (N, 6)."""
+        frame = _NOWHERE if at.frame is None else at.frame
+        outer, near = screws.frames(np.stack([at.origin, frame]))
+        base, moved = outer @ near, screws.frames(at.pose)
+        mounted, within = (
+            screws.frames(np.ascontiguousarray(each.reshape(-1, 6))) for each in (tool_origin, tool)
+        )
+        to_mounting = base @ moved @ mounted
+        board, to_board = to_mounting @ within, None
+        if self.on == "platform":
+            board = np.linalg.inv(board)
+            to_board = -_adjoint(board)
+        seen, by_twist, by_lens, by_size, depth = instruments.pixels(
+            screws.pose(np.ascontiguousarray(board).reshape(-1, 16)),
+            self._corners(len(at.pose)) if corner is None else corner,
+            self._lens() if lens is None else lens,
+            size,
+        )
+        seen[~(depth > 0)] = np.nan
+        by = by_twist if to_board is None else by_twist @ to_board
+        by_frame = None
+        if at.frame is not None:
+            by_frame = by @ _adjoint(outer[None]) @ _twists_of_numbers(at.frame[None])
+        of_tool = _adjoint(to_mounting) @ _twists_of_numbers(tool.reshape(-1, 6))
+        return Predicted(
+            seen,
+            by @ (_adjoint(base[None]) @ _at_base(at.pose)),
+            {"tool": by @ of_tool, "lens": by_lens, "size": by_size[:, :, None]},
+            by_frame=by_frame,
+        )
+
+    def dependences(self, data: InFit) -> Iterator[Dependence]:
+        """What is mounted on the platform; the lens and the size of the board."""
+        m = data.measured
+        count, every = len(m), np.zeros(len(m), dtype=np.intp)
+        yield always("tool", "tool", PLACE, [self._carried_thing] * count, data.starts)
+        yield Dependence("corner", "corner", self._corners(count), {}, every)
+        lens = np.tile(self._lens(), (count, 1))
+        slots = _FOUND[self.lens]
+        found = {"": self._lens_numbers(m, slots)} if slots else {}
+        yield Dependence("lens", "lens", lens, found, every)
+        if self.find_size:
+            extent = float(np.abs(self._corners(count)).max(initial=1.0))
+            number = Numbers(
+                ("board.size",), ("1",), np.zeros(1, dtype=np.intp), np.zeros(1),
+                np.array([1.0 / extent]),
+            )  # fmt: skip
+            yield Dependence("size", "size", np.zeros((count, 1)), {"": number}, every)
+
+    def starts(self, machine: Any, sets: Sets, found: Found) -> None:
+        """At the platform; `places_seen` puts it in its place together with the frame."""
+        for data, _ in sets:
+            thing = data.measured.instrument._carried_thing
+            found["tool", thing] = Start(tuple(range(6)), np.zeros(6))
+
+    def places_seen(self, m: Measured, pose: FloatArray) -> FloatArray:
+        """Pose (N, 6) of the tool in the frame, by the whole picture of each of its first rows.
+
+        Of both places at which a small flat board looks alike that of which several pictures and
+        the machine's poses (N, 6) agree; NaN in all other rows.
+        """
+        found = np.full((len(m), 6), np.nan)
+        picture = self._pictures(m)
+        corner = self._corners(len(m))
+        known = np.isfinite(m.values).all(axis=1)
+        flat = np.linalg.svd(corner - corner.mean(axis=0), compute_uv=False)
+        fewest = _FEWEST if flat[-1] <= 1e-6 * flat[0] else 6
+        enough = np.bincount(picture[known], minlength=int(picture.max()) + 1) >= fewest
+        used = np.flatnonzero(known & enough[picture])
+        if not len(used):
+            return found
+        _, first, number = np.unique(picture[used], return_index=True, return_inverse=True)
+        boards = board_poses(corner[used], m.values[used], self._lens(), number.reshape(-1))
+        seen = boards.pose
+        if self.on == "platform":
+            seen = _inverse(seen.reshape(-1, 6)).reshape(seen.shape)
+        found[used[first]] = in_agreement(seen, pose[used[first]])
+        return found
+
+    def arguments(self, m: Measured) -> dict[str, FloatArray]:
+        """What is mounted where, as a simulation was told."""
+        return {"tool": as_rows("carried", self.carried, 6)[0][0]}
+
+    def simulated(self, m: Measured, solve: Solve) -> FloatArray:
+        """NaN of corners that are behind the camera or beyond its picture."""
+        stands = as_rows("stands", self.stands, 6)[0][0]
+        at = At(solve(m.actuators, "q").pose, frame=stands)
+        seen = self.predict(at, **self.arguments(m)).values
+        for k, end in enumerate((self.width, self.height)):
+            if end:
+                seen[~((seen[:, k] >= 0) & (seen[:, k] <= end - 1))] = np.nan
+        return seen
+
+    # units ----------------------------------------------------------------------------------------
+
+    def mm(self, m: Measured, length: float) -> FloatArray:
+        """A pixel across the line of sight at the board: the median of the pictures (2,).
+
+        Of pictures that do not tell it, as far away as the machine is large.
+        """
+        corner, picture = self._corners(len(m)), self._pictures(m)
+        known = np.flatnonzero(np.isfinite(m.values).all(axis=1))
+        order = known[np.argsort(picture[known], kind="stable")]
+        ends = np.flatnonzero(np.diff(picture[order])) + 1
+        sizes = [_mm_per_pixel(corner[own], m.values[own]) for own in np.split(order, ends)]
+        told = [each for each in sizes if np.isfinite(each)]
+        focal = max(self.fx, self.fy)
+        return np.full(2, float(np.median(told)) if told else length / focal)
+
+    # rows -----------------------------------------------------------------------------------------
+
+    def of_rows(
+        self, values: Any, actuators: FloatArray, targets: int | None
+    ) -> tuple[Camera, ArrayLike | None]:
+        """Check lens, mounting and corners."""
+        word("on", self.on, ("base", "platform"))
+        word("lens", self.lens, tuple(_FOUND))
+        if self.corner is None:
+            raise ArgumentError(
+                "corner: pixels need the corner that each row shows: its place on the board, as"
+                " Board.at has it"
+            )
+        numbers = rows.numbers("lens", self._lens())
+        if not (numbers[:2] > 0).all():
+            raise ArgumentError(
+                f"fx and fy must be above 0 px; found {numbers[0]:g} and {numbers[1]:g}: read the"
+                " lens file (Camera.from_file), or state about 1.2 times the width of the pictures"
+                ' and lens="all"'
+            )
+        own, read = super().of_rows(values, actuators, targets)
+        return own, read
+
+    @property
+    def _carried_thing(self) -> str:
+        """What of both is on the platform."""
+        return "board" if self.on == "base" else "camera"
+
+    def _corners(self, count: int) -> FloatArray:
+        return np.array(np.broadcast_to(np.asarray(self.corner, dtype=np.float64), (count, 3)))
+
+    def _lens(self) -> FloatArray:
+        return np.array([getattr(self, name) for name in LENS], dtype=np.float64)
+
+    def _lens_numbers(self, m: Measured, slots: tuple[int, ...]) -> Numbers:
+        """Numbers of the lens that are found, counted by how much they move what is seen."""
+        lens = np.tile(self._lens(), (len(m), 1))
+        known = np.isfinite(m.values).all(axis=1)
+        rate = np.ones(9)
+        if known.any():
+            ahead = np.column_stack([unbent(m.values[known], lens[known]), np.ones(known.sum())])
+            by_lens = instruments.pixels(np.zeros((len(ahead), 6)), ahead, lens[known])[2]
+            rate = np.sqrt(np.nanmean(by_lens**2, axis=(0, 1)))
+        pixel = 1.0 / self.mm(m, 1000.0)[0]
+        chosen = list(slots)
+        return Numbers(
+            tuple(f"lens.{LENS[slot]}" for slot in slots),
+            tuple(_UNITS[slot] for slot in slots),
+            np.array(chosen, dtype=np.intp),
+            self._lens()[chosen],
+            pixel / np.maximum(rate, _LEAST)[chosen],
+        )
+
+    def _pictures(self, m: Measured) -> IntArray:
+        """Which picture each row is of, (N,), counted from 0."""
+        if m.group is not None:
+            return np.unique(m.group, return_inverse=True)[1].reshape(-1)
+        return np.unique(m.actuators, axis=0, return_inverse=True)[1].reshape(-1)
+
+    # tables ---------------------------------------------------------------------------------------
+
+    def found_in(self, table: Table) -> list[str]:
+        """Columns u and v."""
+        return ["u, v"] if {"u", "v"} <= table.columns.keys() else []
+
+    def names(self, table: Table) -> set[str]:
+        """Pixels, and the numbers of corners."""
+        return {"u", "v"} | ({"corner"} if "u" in table.columns else set())
+
+    def read(self, table: Table, units: Any) -> Camera:
+        """Corners by their numbers on the board that is given, where the file has numbers."""
+        if "corner" not in table.columns:
+            return self
+        if self.board is None:
+            raise table.header_error(
+                "column 'corner': state the board, as kind=Camera(board=Board.parse(...), ...)"
+            )
+        places = self.board.at(table.integers("corner"))
+        return self.with_fields({"corner": places, "board": None})
+
+
+def _adjoint(motion: FloatArray) -> FloatArray:
+    """Of motions (N, 4, 4), (N, 6, 6)."""
+    flat = np.ascontiguousarray(motion).reshape(-1, 16)
+    matrices: FloatArray = screws.adjoint(flat).reshape(-1, 6, 6)
+    return matrices
+
+
+def _inverse(pose: FloatArray) -> FloatArray:
+    """Inverse poses (N, 6); NaN of NaN."""
+    found = np.full_like(pose, np.nan)
+    known = np.isfinite(pose).all(axis=1)
+    motion = np.linalg.inv(screws.frames(pose[known]))
+    found[known] = screws.pose(np.ascontiguousarray(motion).reshape(-1, 16))
+    return found
+
+
+def _at_base(pose: FloatArray) -> FloatArray:
+    """Twists at the base's origin (N, 6, 6) by those at the platform's, which is at (N, 6)."""
+    found = np.tile(np.eye(6), (len(pose), 1, 1))
+    found[:, 3:, :3] = _crossed(pose[:, :3])
+    return found
+
+
+def _twists_of_numbers(pose: FloatArray) -> FloatArray:
+    """Twists (N, 6, 6) about the origin by the numbers x y z α β γ of poses (N, 6)."""
+    found = np.zeros((len(pose), 6, 6))
+    axes = orientation.axes_of_angles(pose[:, 3:])
+    found[:, :3, 3:] = axes
+    found[:, 3:, :3] = np.eye(3)
+    found[:, 3:, 3:] = _crossed(pose[:, :3]) @ axes
+    return found
+
+
+def _crossed(place: FloatArray) -> FloatArray:
+    """Matrices (N, 3, 3) of cross products with places (N, 3)."""
+    found = np.zeros((len(place), 3, 3))
+    for i in range(3):
+        found[:, :, i] = np.cross(place, np.eye(3)[i])
+    return found
+
+
+def _mm_per_pixel(corner: FloatArray, pixel: FloatArray) -> float:
+    """By the picture of a board (k, 3) as if from far away; NaN where corners are in a line."""
+    if len(corner) < 3:
+        return float("nan")
+    away = corner - corner.mean(axis=0)
+    size, axes = np.linalg.svd(away, full_matrices=False)[1:]
+    across = axes[size > 1e-6 * size[0]]
+    if len(across) < 2:
+        return float("nan")
+    image = np.linalg.lstsq(away @ across.T, pixel - pixel.mean(axis=0), rcond=None)[0]
+    return 1.0 / float(np.linalg.norm(image, ord=2))

@@ -1,0 +1,131 @@
+"""Files of a camera's lens: OpenCV's YAML and JSON, and ``camera_info`` of ROS.
+
+OpenCV's YAML has a first line ``%YAML:1.0`` and tags ``!!opencv-matrix`` that libraries for YAML
+refuse; of either form no more than numbers, words and lists under names is read here.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pkmcal.exceptions import FileError
+
+_MATRIX = ("camera_matrix", "cameramatrix", "k", "m1", "intrinsic_matrix")
+_BENT = ("distortion_coefficients", "distcoeffs", "dist_coeffs", "dist_coeff", "d", "d1")
+_MODEL = ("distortion_model", "camera_model")
+_PLAIN = ("", "plumb_bob", "pinhole", "radtan", "brown", "opencv")
+_SIZE = {"width": ("image_width", "width"), "height": ("image_height", "height")}
+_NAMES = ("k1", "k2", "p1", "p2", "k3")
+_ENTRY = re.compile(r"^(?P<indent> *)(?:- )?(?P<name>[A-Za-z_][\w. -]*?) *: *(?P<rest>.*)$")
+_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+
+
+def read_lens(path: str | PathLike[str]) -> dict[str, float]:
+    """Read fx fy cx cy k1 k2 p1 p2 k3, and width and height where they are stated.
+
+    Raises
+    ------
+    ValueError
+        Naming the file: no camera matrix, numbers missing, or a lens of another kind.
+    OSError
+        The file cannot be read.
+    """
+    file = Path(path)
+    text = file.read_text(encoding="utf-8", errors="replace")
+    if text.lstrip().startswith("<"):
+        raise FileError(f"{file}: XML is not read; save the calibration as YAML or JSON")
+    try:
+        found = json.loads(text) if text.lstrip().startswith("{") else _entries(text)
+    except json.JSONDecodeError as error:
+        raise FileError(f"{file}: line {error.lineno}: no JSON: {error.msg}") from None
+    if not isinstance(found, Mapping):
+        raise FileError(f"{file}: expected a camera matrix and its names, found a list")
+    known = {str(name).lower().strip(): value for name, value in found.items()}
+    model = str(_first(known, _MODEL) or "").strip("\"' ")
+    if model.lower() not in _PLAIN:
+        raise FileError(
+            f"{file}: distortion model {model!r}: only the numbers k1 k2 p1 p2 k3 of OpenCV are"
+            " supported; rectify the images and state the lens of the rectified ones"
+        )
+    matrix = _numbers(_first(known, _MATRIX))
+    if len(matrix) != 9:
+        raise FileError(
+            f"{file}: expected a camera matrix of 9 numbers under {', '.join(_MATRIX[:3])}; found"
+            f" {len(matrix)} of {', '.join(map(str, found)) or 'nothing'}"
+        )
+    if matrix[0] <= 0 or matrix[4] <= 0 or abs(matrix[1]) > 1e-9 * matrix[0]:
+        raise FileError(
+            f"{file}: the camera matrix must have focal lengths above 0 and no skew; found"
+            f" {matrix[0]:g}, {matrix[4]:g} and {matrix[1]:g}"
+        )
+    bent = _numbers(_first(known, _BENT))
+    if np.any(np.asarray(bent[5:]) != 0.0):
+        raise FileError(
+            f"{file}: {len(bent)} distortion coefficients (rational, thin prism or tilted): only k1"
+            " k2 p1 p2 k3 are supported; calibrate with these, or rectify the images"
+        )
+    lens = dict(zip(("fx", "cx", "fy", "cy"), (matrix[i] for i in (0, 2, 4, 5)), strict=True))
+    lens |= dict(zip(_NAMES, bent, strict=False))
+    for name, words in _SIZE.items():
+        size = _numbers(_first(known, words))
+        if len(size) == 1:
+            lens[name] = int(size[0])
+    return lens
+
+
+def _first(known: Mapping[str, Any], names: tuple[str, ...]) -> Any:
+    return next((known[name] for name in names if name in known), None)
+
+
+def _numbers(value: Any) -> list[float]:
+    """Numbers of a list, a list of lists, a matrix with `data`, or a text that shows them."""
+    if value is None:
+        return []
+    if isinstance(value, Mapping):
+        return _numbers(next((value[name] for name in ("data", "matrix") if name in value), None))
+    if isinstance(value, list):
+        return [number for each in value for number in _numbers(each)]
+    if isinstance(value, str):
+        return [float(each) for each in _NUMBER.findall(value)]
+    return [float(value)]
+
+
+def _entries(text: str) -> dict[str, Any]:
+    """Names of YAML at the outermost level: a text each, or a matrix with the text of its data."""
+    found: dict[str, Any] = {}
+    top, inner = "", ""
+    for line in text.splitlines():
+        plain = line.split(" #")[0].rstrip()
+        if not plain or plain.lstrip().startswith(("#", "%", "---")):
+            continue
+        entry = _ENTRY.match(plain)
+        if entry is None or (entry["indent"] and inner == "data" and ":" not in plain):
+            _add(found, top, inner, plain)
+        elif not entry["indent"]:
+            top, inner = entry["name"].lower(), ""
+            rest = entry["rest"]
+            if data := re.search(r"data *: *(\[.*)", rest):
+                found[top], inner = {"data": data[1]}, "data"
+            elif rest.startswith("!!") or not rest:
+                found[top] = {}
+            else:
+                found[top] = rest
+        else:
+            inner = entry["name"].lower()
+            _add(found, top, inner, entry["rest"])
+    return found
+
+
+def _add(found: dict[str, Any], top: str, inner: str, text: str) -> None:
+    """Go on with what stands under a name."""
+    if isinstance(found.get(top), dict):
+        found[top][inner] = found[top].get(inner, "") + " " + text
+    elif top:
+        found[top] = f"{found.get(top, '')} {text}"

@@ -1,0 +1,70 @@
+"""Which of the two places at which a flat board looks alike it is at, by all pictures together.
+
+Of the true places M = F P T holds in every picture, with one frame and one tool; mirrored ones
+contradict each other. From a few pictures drawn at random, each place chosen by chance, frame and
+tool follow in closed form; all others then choose the nearer place. The draw with the least misfit
+counts (M. A. Fischler and R. C. Bolles, Random sample consensus, Communications of the ACM 24
+(1981) 381-395).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pkmcal.arrays import BoolArray, FloatArray, IntArray
+from pkmcal.core.poses import compose
+from pkmcal.readings import orientation
+from pkmcal.readings.hand_eye import of_frame_and_tool
+
+_DRAWN = 5  # pictures of a draw
+_DRAWS = 60
+_ROUNDS = 10  # of choosing and laying in turn
+_GROSS = 0.2  # rad, or share of the distance, beyond which a picture is off and no more
+
+
+def in_agreement(seen: FloatArray, pose: FloatArray) -> FloatArray:
+    """Of places (P, 2, 6) those (P, 6) that agree with poses (P, 6) of the platform.
+
+    The second place is NaN where there is but one.
+    """
+    doubtful: BoolArray = np.asarray(np.isfinite(seen[:, 1]).all(axis=1))
+    chosen = np.zeros(len(seen), dtype=np.intp)
+    if not doubtful.any() or len(seen) < 3:
+        return _taken(seen, chosen)
+    random = np.random.default_rng(0)
+    best, least = chosen, np.inf
+    for draw in range(_DRAWS):
+        if draw:
+            some = random.permutation(len(seen))[:_DRAWN]
+            sides = random.integers(2, size=len(some)) * doubtful[some]
+            off = _misfits(seen, pose, some, sides)
+            chosen = np.nanargmin(off, axis=1)
+        for _ in range(_ROUNDS):
+            off = _misfits(seen, pose, np.arange(len(seen)), chosen)
+            before, chosen = chosen, np.nanargmin(off, axis=1)
+            if np.array_equal(before, chosen):
+                break
+        misfit = float(np.minimum(np.nanmin(off, axis=1), _GROSS).sum())
+        if misfit < least:
+            best, least = chosen, misfit
+    return _taken(seen, best)
+
+
+def _taken(seen: FloatArray, chosen: IntArray) -> FloatArray:
+    taken: FloatArray = seen[np.arange(len(seen)), chosen]
+    return taken
+
+
+def _misfits(seen: FloatArray, pose: FloatArray, some: IntArray, sides: IntArray) -> FloatArray:
+    """How far both places of each picture (P, 2) are from the frame and tool of some of them."""
+    frame, tool = of_frame_and_tool(seen[some, sides], pose[some])
+    laid = compose(compose(frame, pose), tool)
+    distance = float(np.median(np.linalg.norm(seen[:, 0, :3], axis=1)))
+    off = np.full(seen.shape[:2], np.nan)
+    for side in range(2):
+        known = np.isfinite(seen[:, side]).all(axis=1)
+        turned = orientation.between(seen[known, side, 3:], laid[known, 3:])
+        moved = seen[known, side, :3] - laid[known, :3]
+        angle, way = (np.linalg.norm(each, axis=1) for each in (turned, moved))
+        off[known, side] = angle + way / distance
+    return off
