@@ -167,4 +167,4 @@ def test_touches_of_one_height_have_no_scale(seed):
         found = pk.identify(ROBOT, m, "offset*")
     assert found.converged
     assert not any("scale of the instrument" in str(each) for each in found.verdict.said)
-    assert "scale" not in {name for each, _ in possible(found.fit) for name in [each.name]}
+    assert "scale" not in {each.name for each, _ in possible(found.fit)}
