@@ -83,6 +83,7 @@ def identify(
         Of any kinds.
     free : str or sequence of str, optional
         Names of numbers to find, or wildcards (``"base*.x"``). None: the robot's own default set.
+        Empty: the machine is held, and only what the readings need beside it is found, as frames.
     prior : float or mapping of str to float or (float, float), optional
         Standard deviation around the present value. A number, in mm, holds for all free numbers
         of the geometry (an angle as its arc at the machine's characteristic length) but those of a

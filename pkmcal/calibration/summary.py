@@ -118,7 +118,8 @@ def _noise(misfit: Solution) -> Iterator[str]:
         for own, pose in zip(misfit.reading_noise, misfit.pose_noise, strict=True)
         if np.isfinite(own)
     ]
-    estimated = [_short(noise) for noise in misfit.noise if np.isfinite(noise)]
+    own = zip(misfit.noise, misfit.component_noise, misfit.component_units, strict=True)
+    estimated = [_with_pixels(*each) for each in own if np.isfinite(each[0])]
     if np.isfinite(misfit.actuator_noise):
         estimated.append(f"of the actuators {_short(misfit.actuator_noise)}")
     if any(pose > _SHARED * own for own, pose in split):
@@ -137,10 +138,17 @@ def _noise(misfit: Solution) -> Iterator[str]:
         yield f"load cells off by {_short(misfit.tension_rms)} N rms"
     if not misfit.told_apart:
         return
-    for names, deviations in zip(misfit.components, misfit.component_noise, strict=True):
-        pairs = zip(names, deviations, strict=True)
-        each = [_of_component(*pair, "rad" if k > 2 else "mm") for k, pair in enumerate(pairs)]
+    several = misfit.components, misfit.component_noise, misfit.component_units
+    for names, deviations, units in zip(*several, strict=True):
+        each = [_of_component(*own) for own in zip(names, deviations, units, strict=True)]
         yield f"noise of {', '.join(each)}"
+
+
+def _with_pixels(noise: float, deviations: Sequence[float], units: Sequence[str]) -> str:
+    """A deviation in mm, of pixels in px before it."""
+    pixels = [each for each, unit in zip(deviations, units, strict=True) if unit == "px"]
+    shown = f"{_short(float(np.sqrt(np.mean(np.square(pixels)))))} px or " if pixels else ""
+    return shown + _short(noise)
 
 
 def _of_component(name: str, deviation: float, unit: str) -> str:

@@ -15,6 +15,7 @@ import pkmcal as pk
 from pkmcal.arguments import word
 from pkmcal.calibration.asked import Role
 from pkmcal.calibration.rigid import rigid_arm
+from pkmcal.cli.camera_options import BoardSeen, BoardSize, CameraOn, Lens, LensFound, camera
 from pkmcal.cli.effects_option import AUTO, HELP, OPTION, read_effects
 from pkmcal.cli.geometry_options import (
     free_names,
@@ -184,6 +185,11 @@ def calibrate(
     rotation: Rotation = None,
     invert_poses: InvertPoses = False,
     probe_offset: ProbeOffset = None,
+    lens_file: Lens = None,
+    camera_on: CameraOn = "base",
+    board: BoardSeen = None,
+    lens: LensFound = "none",
+    find_size: BoardSize = False,
     tracker: Annotated[
         str | None,
         typer.Option(
@@ -231,8 +237,9 @@ def calibrate(
     given = pk.load(read.robot(robot))
     machine = as_machine(given)
     reading = Reading(
-        controller, join, ignore, rename, columns, units, rotation, probe_offset, invert_poses
-    )
+        controller, join, ignore, rename, columns, units, rotation, probe_offset, invert_poses,
+        camera(lens_file, camera_on, board, lens, find_size),
+    )  # fmt: skip
     with warnings.catch_warnings(record=True) as doubts:
         warnings.simplefilter("always", pk.CalibrationWarning)
         measured = [reading.measurements(path, read, machine) for path in csv]
@@ -263,8 +270,10 @@ def calibrate(
         named, held = without_lines(named, held, measured)
     dropped = rows_to_drop(named, measured)
     fixed = matching("--fix", machine, fix or [])
-    chosen = [name for name in free_names(machine, free) if name not in fixed]
-    if fixed and not chosen:
+    held_machine = free == ["none"]  # frame, tool and lens alone
+    wanted = [] if held_machine else free_names(machine, free)
+    chosen = [name for name in wanted if name not in fixed]
+    if fixed and not chosen and not held_machine:
         raise ArgumentError(f"--fix {','.join(fix or [])}: no parameter is left free")
     found_rows: dict[Found, bool] = {"outliers": drop_outliers, "slack": drop_slack}
     held_by_datum = ["datum"] if word("--datum", datum, ("none", "auto")) == "auto" else []
@@ -280,7 +289,7 @@ def calibrate(
         found = pk.identify(
             given,
             measured[0] if len(measured) == 1 else measured,
-            free=chosen or None,
+            free=chosen if held_machine else chosen or None,
             prior=read_prior(prior or [], machine, chosen),
             loss=weight if rule == "auto" else (weight, rule),
             unknown=_unknown(frame, target, attachment, measured),

@@ -98,6 +98,7 @@ class Reading:
     rotation: str | None = None
     probe_offset: str | None = None
     invert_poses: bool = False
+    camera: pk.readings.Camera | None = None
 
     def measurements(self, path: str | Path, read: Inputs, robot: Calibratable) -> Measurements:
         """The measurements of a file; what was assumed is printed to stderr, a line each."""
@@ -116,7 +117,7 @@ class Reading:
             stated["probe_offset"] = _offset(self.probe_offset)
         log = None if self.controller is None else read.file(self.controller)
         measured = pk.read_measurements(
-            read.file(path), robot, controller=log, join=self.join, **stated
+            read.file(path), robot, controller=log, join=self.join, kind=self.camera, **stated
         )
         for note in measured.notes:
             say(f"pkmcal: {note}", err=True)

@@ -38,7 +38,7 @@ Free = Annotated[
     typer.Option(
         metavar="NAME",
         help="Identify this number instead of the robot's default set. Repeat it, separate names"
-        " with commas, or use wildcards: 'rod*,radius'.",
+        " with commas, or use wildcards: 'rod*,radius'. none: only where instruments stand.",
     ),
 ]
 Prior = Annotated[

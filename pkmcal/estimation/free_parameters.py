@@ -77,6 +77,8 @@ def parameters(
     )
     every = [geometry.units[i] for i in places]
     every += [unit for each in beside.values() for unit in each.units]
+    if not names:
+        raise ArgumentError("free: name at least one parameter, nothing else is unknown")
     _refuse_twice(names)
     units = tuple(str(every[j]) for j in number_of)
     of_unit = unit_scales(robot, [data.measured for data in datasets])
@@ -164,8 +166,6 @@ def _free_names(robot: Calibratable, asked: Asked) -> tuple[list[str], list[str]
                 " or state them in its file: [calibration] free = [...]"
             )
     chosen = geometry.match(free, "free")
-    if not chosen:
-        raise ArgumentError("free: name at least one parameter")
     chosen = list(dict.fromkeys([*chosen, *asked.of_effects]))
     held = geometry.match(asked.fix, "fix") if asked.fix else []
     along = uncertain_names(asked.uncertainty, robot, (*chosen, *held))

@@ -270,10 +270,11 @@ class Parameters:
         """Parameters (g,) of the geometry in a session; in the last one by default."""
         last = self.sessions[-1] if self.sessions else ""
         name = last if session is None else session
-        return np.array([
+        columns = [
             self.column[number, label(self.scope[number], name, "")]
             for number in range(len(self.places))
-        ])  # fmt: skip
+        ]
+        return np.array(columns, dtype=np.intp)
 
     def values_at(self, theta: FloatArray, columns: IntArray | None = None) -> FloatArray:
         """The geometry's values (p,) for `theta` (n,), of a machine whose numbers are `columns`.

@@ -131,9 +131,14 @@ def misfit(
     split = uncertainty.noises
     shown = np.where(estimator.unstated & ~uncertainty.unknown, state.noise, np.nan)
     deviations = equations.whitening.deviations
+    sets = equations.table.sets
+    arcs = [
+        np.asarray(sigma * relative)
+        for relative, sigma, _ in zip(deviations, shown, sets, strict=False)
+    ]
     by_component = tuple(
-        tuple((sigma * relative / m.instrument.mm(m, estimator.start.robot.length)).tolist())
-        for m, relative, sigma in zip(equations.table.sets, deviations, shown, strict=False)
+        tuple((arc / m.instrument.mm(m, estimator.start.robot.length)).tolist())
+        for m, arc in zip(sets, arcs, strict=True)
     )
     named = outlying(estimator, estimate)
     before, after = (distances(misfits.distances(equations, each), named) for each in (start, end))
@@ -150,9 +155,10 @@ def misfit(
         "idle": equations.blocks.uninformative,
         "chi2_per_dof": float((squares + prior @ prior) / dof) if stated else float("nan"),
         "dof": dof,
-        "noise": tuple(rms(np.array(each[:3])) for each in by_component),
+        "noise": tuple(rms(arc[:3]) for arc in arcs),
         "component_noise": by_component,
-        "components": tuple(m.components for m in equations.table.sets),
+        "components": tuple(m.components for m in sets),
+        "component_units": tuple(m.units for m in sets),
         "told_apart": any((relative != 1.0).any() for relative in deviations),
         "reading_noise": tuple(float(np.sqrt(total - shared)) for total, shared in split),
         "pose_noise": tuple(float(np.sqrt(shared)) for _, shared in split),

@@ -143,11 +143,13 @@ class Solution(HeldOut, Generic[Machine]):
         That of residuals: what a reading has of its own and what its pose shares, the model's error
         included. NaN, too, where no equations are left to show it.
     component_noise : tuple of tuple of float
-        `noise` of each component, mm and rad.
+        `noise` of each component, in its own unit.
 
         Components are told apart where the residuals call for it: lengths and angles, x y and z.
     components : tuple of tuple of str
         What was read of each set: x, y, z.
+    component_units : tuple of tuple of str
+        Unit of each: "mm", "rad", "px".
     told_apart : bool
         Whether components differ in their noise.
     reading_noise : tuple of float
@@ -230,6 +232,7 @@ class Solution(HeldOut, Generic[Machine]):
     noise: tuple[float, ...]
     component_noise: tuple[tuple[float, ...], ...]
     components: tuple[tuple[str, ...], ...]
+    component_units: tuple[tuple[str, ...], ...]
     told_apart: bool
     reading_noise: tuple[float, ...]
     pose_noise: tuple[float, ...]

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from os import PathLike
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -31,11 +31,18 @@ from pkmcal.readings.lens_files import read_lens
 from pkmcal.readings.measured import InFit, Measured
 from pkmcal.readings.reading import At, Predicted, Reading, Sets, Solve
 from pkmcal.readings.seen_places import in_agreement
-from pkmcal.readings.unknowns import PLACE, Dependence, Found, Numbers, Start, always
+from pkmcal.readings.unknowns import PLACE, Dependence, Numbers, Start, always
+from pkmcal.readings.unknowns import Found as Starts
 
+Mount = Literal["base", "platform"]
+Found = Literal["none", "focal", "all"]
 LENS = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
 _UNITS = ("px", "px", "px", "px", "1", "1", "1", "1", "1")
-_FOUND: Mapping[str, tuple[int, ...]] = {"none": (), "focal": (0, 1, 2, 3), "all": tuple(range(8))}
+_FOUND: Mapping[Found, tuple[int, ...]] = {
+    "none": (),
+    "focal": (0, 1, 2, 3),
+    "all": tuple(range(8)),
+}
 _NOWHERE = np.zeros(6)
 _NO_SIZE = np.zeros(1)
 _FEWEST = 4  # corners of a picture that tell where a flat board is; of another one 6
@@ -84,7 +91,7 @@ class Camera(Reading):
     """
 
     corner: ArrayLike | None = None
-    on: Literal["base", "platform"] = "base"
+    on: Mount = "base"
     fx: float = 0.0
     fy: float = 0.0
     cx: float = 0.0
@@ -96,7 +103,7 @@ class Camera(Reading):
     k3: float = 0.0
     width: int = 0
     height: int = 0
-    lens: Literal["none", "focal", "all"] = "none"
+    lens: Found = "none"
     find_size: bool = False
     board: Board | None = None
     stands: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -206,7 +213,7 @@ class Camera(Reading):
             )  # fmt: skip
             yield Dependence("size", "size", np.zeros((count, 1)), {"": number}, every)
 
-    def starts(self, machine: Any, sets: Sets, found: Found) -> None:
+    def starts(self, machine: Any, sets: Sets, found: Starts) -> None:
         """At the platform; `places_seen` puts it in its place together with the frame."""
         for data, _ in sets:
             thing = data.measured.instrument._carried_thing
@@ -272,7 +279,7 @@ class Camera(Reading):
         self, values: Any, actuators: FloatArray, targets: int | None
     ) -> tuple[Camera, ArrayLike | None]:
         """Check lens, mounting and corners."""
-        word("on", self.on, ("base", "platform"))
+        word("on", self.on, get_args(Mount))
         word("lens", self.lens, tuple(_FOUND))
         if self.corner is None:
             raise ArgumentError(
@@ -341,7 +348,8 @@ class Camera(Reading):
             return self
         if self.board is None:
             raise table.header_error(
-                "column 'corner': state the board, as kind=Camera(board=Board.parse(...), ...)"
+                "column 'corner': state the board and the lens of the camera, as --camera FILE"
+                " --board BOARD (kind=pkmcal.readings.Camera(board=Board.parse(...), ...))"
             )
         places = self.board.at(table.integers("corner"))
         return self.with_fields({"corner": places, "board": None})

@@ -1,0 +1,235 @@
+"""How far a calibration by a camera is off at other poses, and how often what it states holds.
+
+Machines with errors of 0.3 mm are seen by a camera of 2448 x 2048 pixels, 12 mm and 0.1 px of noise
+on a board of 10 x 5 corners: from beside the machine, or from its platform. Some read their
+actuators with an error of 10 µm that a picture shares. "Elsewhere" are 40 other poses, compared
+after the best motions of base and platform: what no camera without a datum tells is not counted.
+
+    python -m benchmarks.bench_camera [RUNS [SCENARIO ...]]
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+import warnings
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+import pkmcal as pk
+from pkmcal.arrays import FloatArray
+from pkmcal.readings import Board, Camera
+
+LENS = {
+    "fx": 3478.0, "fy": 3478.0, "cx": 1223.5, "cy": 1023.5,
+    "k1": -0.10, "k2": 0.08, "p1": 4e-4, "p2": -3e-4, "k3": -0.02, "width": 2448, "height": 2048,
+}  # fmt: skip
+NOISE, ERRORS, ELSEWHERE = 0.1, 0.3, 40  # px; mm and mrad; poses
+_DRAWN = 20  # poses a picture, of which those are taken that show the whole board
+JOINTS = ("base*", "platform*", "offset*")
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """A machine, a camera and how it looks.
+
+    Attributes
+    ----------
+    pictures : int
+        How many are taken.
+    machine : str
+        Which.
+    free : sequence of str
+        What is looked for.
+    eye, at : (3,) tuple
+        Where a camera stands, and a point in the middle of its pictures, mm. A camera that rides
+        looks at a board 700 mm above that point.
+    pitch : float
+        Between corners, mm.
+    share : float
+        Of the workspace that poses are in.
+    actuators : float
+        Standard deviation of what actuators are off in a picture, mm.
+    lens : str
+        What of the lens is found as well.
+    on : str
+        What the camera is on.
+    """
+
+    pictures: int = 30
+    machine: str = "hexapod"
+    free: tuple[str, ...] = JOINTS
+    eye: tuple[float, float, float] = (500, -600, 2000)
+    at: tuple[float, float, float] = (0, 0, 800)
+    pitch: float = 20.0
+    share: float = 0.3
+    actuators: float = 0.0
+    lens: Literal["none", "focal"] = "none"
+    on: Literal["base", "platform"] = "base"
+
+
+DELTA = Scenario(
+    machine="linear-delta", free=(*JOINTS, "rod*", "slider*"), eye=(150, -200, 500), at=(0, 0, 60),
+    pitch=6, share=0.9,
+)  # fmt: skip
+SCENARIOS = {
+    "hexapod, 15 pictures": Scenario(15),
+    "hexapod": Scenario(),
+    "hexapod, 100 pictures": Scenario(100),
+    "hexapod, focal lengths free": Scenario(lens="focal"),
+    "hexapod, camera rides": Scenario(on="platform"),
+    "hexapod, legs of 10 um": Scenario(actuators=0.01),
+    "linear delta": DELTA,
+    "3-RPS": Scenario(
+        machine="3rps", free=(*JOINTS, "normal*"), eye=(500, -500, 3000), at=(0, 0, 1800), share=0.5
+    ),
+}
+
+
+class Tally(NamedTuple):
+    """Of one calibration: rms off and stated elsewhere, mm; share inside ±; what it took."""
+
+    off: float
+    stated: float
+    inside: float
+    actuators: float
+    seconds: float
+
+
+def looking(eye: FloatArray, at: FloatArray) -> FloatArray:
+    """The base (4, 4) in axes of a camera at `eye` that looks at a point, x level."""
+    ahead = (at - eye) / np.linalg.norm(at - eye)
+    right = np.cross(ahead, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    motion = np.eye(4)
+    motion[:3, :3] = [right, np.cross(ahead, right), ahead]
+    motion[:3, 3] = -motion[:3, :3] @ eye
+    return motion
+
+
+def instrument(scenario: Scenario) -> tuple[Camera, Board]:
+    """The camera, mounted, and its board."""
+    grid = Board.chessboard(10, 5, scenario.pitch)
+    board = Board.points(grid.ids.tolist(), grid.places - grid.places.mean(axis=0))
+    stands = pk.screw.to_pose(looking(np.array(scenario.eye), np.array(scenario.at)))
+    carried: tuple[float, ...] = (10, -15, 20, 0.03, -0.02, 0.3)
+    if scenario.on == "platform":
+        x, y, z = scenario.at
+        board_at = pk.screw.from_pose(np.array([x + 40, y - 30, z + 700, 0.05, -0.04, 0.2]))
+        stands, carried = pk.screw.to_pose(np.linalg.inv(board_at)), (20, -10, 30, 0.02, -0.03, 0.4)
+    camera = Camera(**LENS, on=scenario.on, lens=scenario.lens, stands=stands, carried=carried)  # type: ignore[arg-type]
+    return camera, board
+
+
+def measured(
+    scenario: Scenario, random: np.random.Generator
+) -> tuple[pk.Robot, pk.Measurements] | None:
+    """A machine with errors and its pictures, those that show the whole board; None: broken."""
+    robot = pk.load(scenario.machine)
+    geometry = robot.geometry
+    unit = {n: 1e-3 if "tilt" in n else ERRORS for n in geometry.match(scenario.free)}
+    true = robot.replace({n: geometry[n] + random.normal(0.0, s) for n, s in unit.items()})
+    camera, board = instrument(scenario)
+    corners = len(board.ids)
+    poses = pk.sample_poses(robot, _DRAWN * scenario.pictures, seed=0, share=scenario.share)
+    q = robot.inverse(poses)
+    read_at, seeing = camera.seeing(
+        q + random.normal(0.0, 1.0, q.shape) * scenario.actuators, board
+    )
+    seen = pk.VirtualMachine(true, NOISE, int(random.integers(2**31))).measure(read_at, seeing)
+    whole = np.isfinite(seen.values).all(axis=1).reshape(-1, corners).all(axis=1)
+    taken = np.flatnonzero(whole)[: scenario.pictures]
+    if len(taken) < scenario.pictures:
+        return None
+    rows = (taken[:, None] * corners + np.arange(corners)).ravel()
+    own = seen.select(rows)
+    return true, pk.Measurements(
+        np.repeat(q[taken], corners, axis=0), own.values, own.instrument,
+        group=np.repeat(np.arange(len(taken)), corners),
+    )  # fmt: skip
+
+
+def elsewhere(
+    scenario: Scenario, true: pk.Robot, found: pk.Identification
+) -> tuple[FloatArray, FloatArray] | None:
+    """What places (40, 3) are off and their standard deviations, after the best motions."""
+    poses = pk.sample_poses(true, ELSEWHERE, seed=77, share=scenario.share)
+    q = pk.load(scenario.machine).inverse(poses)
+    right, mine = true.forward(q).pose, found.robot.forward(q).pose
+    if not np.isfinite([right, mine]).all():
+        return None
+    names = list(found.robot.geometry.names)
+    of = [i for i, name in enumerate(found.free) if name in names]
+    rates = found.robot.error_twists(mine, q)[:, :, [names.index(found.free[i]) for i in of]]
+    weights = np.repeat([found.robot.length, 1.0], 3)
+    at, wanted = pk.screw.from_pose(mine), pk.screw.from_pose(right)
+    for _ in range(5):
+        off, motions = _differences(at, wanted, weights)
+        left, size, _ = directions = np.linalg.svd(motions, full_matrices=False)
+        told = size > 1e-9 * size[0]
+        left = left[:, told]
+        step = -(directions[2][told].T @ ((left.T @ off.ravel()) / size[told]))
+        at = pk.screw.exp(step[:6]) @ at @ pk.screw.exp(step[6:])
+    off = off.ravel() - left @ (left.T @ off.ravel())
+    rates = (rates * weights[:, None]).reshape(len(off), -1)
+    rates -= left @ (left.T @ rates)
+    variance = np.einsum("ij,jk,ik->i", rates, found.covariance[np.ix_(of, of)], rates)
+    return off.reshape(-1, 6)[:, 3:], np.sqrt(variance).reshape(-1, 6)[:, 3:]
+
+
+def _differences(
+    at: FloatArray, wanted: FloatArray, weights: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Twists (n, 6) at the platform from `wanted`, and by motions of base and platform (6 n, 12)."""
+    turned = at[:, :3, :3] @ wanted[:, :3, :3].transpose(0, 2, 1)
+    axis = np.stack(
+        [turned[:, i, j] - turned[:, j, i] for i, j in ((2, 1), (0, 2), (1, 0))], axis=1
+    )
+    off = np.hstack([0.5 * axis, at[:, :3, 3] - wanted[:, :3, 3]]) * weights
+    motions = np.zeros((len(at), 6, 12))
+    motions[:, :3, :3] = motions[:, 3:, 3:6] = np.eye(3)
+    motions[:, 3:, :3] = -np.cross(at[:, :3, 3, None], np.eye(3)[None], axisa=1, axisb=1, axisc=1)
+    motions[:, :3, 6:9] = motions[:, 3:, 9:] = at[:, :3, :3]
+    return off, (motions * weights[:, None]).reshape(-1, 12)
+
+
+def run(scenario: Scenario, seed: int) -> Tally | None:
+    """One machine; None where poses are out of its reach."""
+    drawn = measured(scenario, np.random.default_rng(seed))
+    if drawn is None:
+        return None
+    true, pictures = drawn
+    start = time.process_time()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        found = pk.identify(pk.load(scenario.machine), pictures, scenario.free, fix="datum")
+    seconds = time.process_time() - start
+    compared = elsewhere(scenario, true, found)
+    if compared is None:
+        return None
+    off, sd = compared
+    rms, stated = (float(np.sqrt((each**2).sum(axis=1).mean())) for each in (off, sd))
+    inside = float((np.abs(off) < 1.96 * sd).mean())
+    return Tally(rms, stated, inside, float(found.actuator_noise), seconds)
+
+
+def main(words: list[str]) -> None:
+    """Print a line a scenario."""
+    count = int(words[0]) if words else 20
+    for name in words[1:] or SCENARIOS:
+        tried = [run(SCENARIOS[name], seed) for seed in range(count)]
+        done = [each for each in tried if each is not None]
+        off, stated, inside, actuators, seconds = np.array(done).T
+        error, promise = np.sqrt(np.mean(off**2)), np.sqrt(np.mean(stated**2))
+        print(
+            f"{name:30s} {len(done):3d} of {count} runs: off {error:.4f} mm, stated {promise:.4f},"
+            f" off/stated {error / promise:.2f}, inside {100 * inside.mean():.1f} %, actuators"
+            f" {np.median(actuators):.4f} mm, {np.median(seconds):.1f} s",
+            flush=True,
+        )
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
