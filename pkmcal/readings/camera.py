@@ -80,10 +80,11 @@ class Camera(Reading):
 
     Examples
     --------
+    >>> import numpy as np
     >>> import pkmcal as pk
     >>> robot = pk.load("hexapod")
     >>> board = pk.readings.Board.chessboard(5, 4, square=30)
-    >>> stands = [0, 0, 2500, 3, 0, 0]
+    >>> stands = [0, 0, 2500, np.pi, 0, 0]  # it looks down
     >>> camera = pk.readings.Camera(fx=3000, fy=3000, cx=1200, cy=1000, stands=stands)
     >>> q, seeing = camera.seeing(robot.inverse([[0, 0, 850, 0, 0, 0]]), board)
     >>> pk.VirtualMachine(robot, 0.0).measure(q, seeing).values[0].round(3)

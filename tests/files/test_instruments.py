@@ -314,7 +314,8 @@ def test_a_sampled_log_says_at_how_many_points_the_machine_moved(tmp_path: Path)
 
 def test_a_missing_column_names_what_was_not_known(tmp_path: Path) -> None:
     with pytest.raises(
-        pk.FileError, match=r"missing column 'q1'; not known: 'Foo', 'Bar'; --rename"
+        pk.FileError,
+        match=r"missing column 'q1'; not known: 'Foo', 'Bar'; if one of them is it: --rename",
     ):
         read(tmp_path, "Foo [mm],Bar [mm],z [mm]\n1,2,3\n")
 

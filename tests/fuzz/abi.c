@@ -373,7 +373,7 @@ static void of_rows(ptrdiff_t n, unsigned strange, int isas)
     const double *a = numbers(6 * n + 6, strange), *b = numbers(6 * n + 6, strange);
     const double *c = numbers(6 * n + 6, strange), *motion = numbers(16 * n + 9, strange);
     const ptrdiff_t six = byte() & 1 ? 6 : 0, three = byte() & 1 ? 3 : 0;
-    one_of(30);
+    one_of(31);
     EACH_ISA(slider_work, n, a, motion, 0, b, motion, D(0, n), D(1, 16 * n));
     EACH_ISA(crank_work, n, a, motion, 0, b, motion, D(0, n), D(1, 16 * n));
     EACH_ISA(compose, n, a, six, b, 6 - six, D(0, 6 * n));

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from pkmcal.readings import Angle, At, Between, Predicted, RelativeDistance, Touch
+from pkmcal.readings import Angle, At, Between, Camera, Predicted, RelativeDistance, Touch
 from pkmcal.readings.registry import KINDS
 from pkmcal.readings.touches import TOUCHES
 
@@ -36,6 +36,7 @@ def needed(kind: str, rows: int, actuators: int, artefact: str = "point") -> dic
         "relative-distance": {"target": [0, 0, 100], "instrument": RelativeDistance(run=names)},
         "angle": {"instrument": Angle("limb1.joint2")},
         "touch": {"instrument": Touch(names, artefact)},
+        "pixel": {"instrument": Camera(corner=second[:, :1] * [1, 2, 0], fx=900, fy=800)},
     }.get(kind, {})
 
 

@@ -71,8 +71,13 @@ def test_one_row_is_taken_as_it_is(kind: str) -> None:
         value = several.values[row] if width(kind) else None
         fields: dict[str, Any] = {} if several.sigma is None else {"sigma": several.sigma[row]}
         of_rows = needed(kind, 5, 4)
-        if kind in ("between", "relative-distance", "touch"):
-            name = {"between": "other", "relative-distance": "run"}.get(kind, "touched")
+        own_of_rows = {
+            "between": "other",
+            "relative-distance": "run",
+            "touch": "touched",
+            "pixel": "corner",
+        }
+        if name := own_of_rows.get(kind):
             own = of_rows["instrument"]
             of_rows["instrument"] = dataclasses.replace(own, **{name: getattr(own, name)[row]})
         fields |= of_rows

@@ -31,7 +31,9 @@ pytestmark = pytest.mark.skipif(
 def flange(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the arm, flange.toml, and the log of its joints, joints.csv."""
     folder = tmp_path_factory.mktemp("charuco")
-    table = np.genfromtxt(DATA / "poses.csv", delimiter=",", skip_header=1, dtype=None, encoding="utf-8")
+    table = np.genfromtxt(
+        DATA / "poses.csv", delimiter=",", skip_header=1, dtype=None, encoding="utf-8"
+    )
     rows = ["image,q1 [mm],q2 [mm],q3 [mm],q4 [deg],q5 [deg],q6 [deg]"]
     for name, x, y, z, *quaternion in table:
         angles = Rotation.from_quat(quaternion, scalar_first=True).as_euler("XYZ", degrees=True)
