@@ -180,7 +180,7 @@ class Camera(Reading):
         seen, by_twist, by_lens, by_size, depth = instruments.pixels(
             screws.pose(np.ascontiguousarray(board).reshape(-1, 16)),
             self._corners(len(at.pose)) if corner is None else corner,
-            self._lens() if lens is None else lens,
+            self.lens_numbers() if lens is None else lens,
             size,
         )
         seen[~(depth > 0)] = np.nan
@@ -202,7 +202,7 @@ class Camera(Reading):
         count, every = len(m), np.zeros(len(m), dtype=np.intp)
         yield always("tool", "tool", PLACE, [self._carried_thing] * count, data.starts)
         yield Dependence("corner", "corner", self._corners(count), {}, every)
-        lens = np.tile(self._lens(), (count, 1))
+        lens = np.tile(self.lens_numbers(), (count, 1))
         slots = _FOUND[self.lens]
         found = {"": self._lens_numbers(m, slots)} if slots else {}
         yield Dependence("lens", "lens", lens, found, every)
@@ -237,7 +237,7 @@ class Camera(Reading):
         if not len(used):
             return found
         _, first, number = np.unique(picture[used], return_index=True, return_inverse=True)
-        boards = board_poses(corner[used], m.values[used], self._lens(), number.reshape(-1))
+        boards = board_poses(corner[used], m.values[used], self.lens_numbers(), number.reshape(-1))
         seen = boards.pose
         if self.on == "platform":
             seen = _inverse(seen.reshape(-1, 6)).reshape(seen.shape)
@@ -287,7 +287,7 @@ class Camera(Reading):
                 "corner: pixels need the corner that each row shows: its place on the board, as"
                 " Board.at has it"
             )
-        numbers = rows.numbers("lens", self._lens())
+        numbers = rows.numbers("lens", self.lens_numbers())
         if not (numbers[:2] > 0).all():
             raise ArgumentError(
                 f"fx and fy must be above 0 px; found {numbers[0]:g} and {numbers[1]:g}: read the"
@@ -305,12 +305,13 @@ class Camera(Reading):
     def _corners(self, count: int) -> FloatArray:
         return np.array(np.broadcast_to(np.asarray(self.corner, dtype=np.float64), (count, 3)))
 
-    def _lens(self) -> FloatArray:
+    def lens_numbers(self) -> FloatArray:
+        """The nine numbers (9,), in the order of `LENS`."""
         return np.array([getattr(self, name) for name in LENS], dtype=np.float64)
 
     def _lens_numbers(self, m: Measured, slots: tuple[int, ...]) -> Numbers:
         """Numbers of the lens that are found, counted by how much they move what is seen."""
-        lens = np.tile(self._lens(), (len(m), 1))
+        lens = np.tile(self.lens_numbers(), (len(m), 1))
         known = np.isfinite(m.values).all(axis=1)
         rate = np.ones(9)
         if known.any():
@@ -323,7 +324,7 @@ class Camera(Reading):
             tuple(f"lens.{LENS[slot]}" for slot in slots),
             tuple(_UNITS[slot] for slot in slots),
             np.array(chosen, dtype=np.intp),
-            self._lens()[chosen],
+            self.lens_numbers()[chosen],
             pixel / np.maximum(rate, _LEAST)[chosen],
         )
 
