@@ -27,6 +27,7 @@ from pkmcal.files.csv_table import Table
 from pkmcal.readings import rows, twists
 from pkmcal.readings.board_poses import board_poses, unbent
 from pkmcal.readings.boards import Board
+from pkmcal.readings.lens_doubts import lens_doubts
 from pkmcal.readings.lens_files import read_lens
 from pkmcal.readings.measured import InFit, Measured
 from pkmcal.readings.reading import At, Predicted, Reading, Sets, Solve
@@ -232,22 +233,36 @@ class Camera(Reading):
         the machine's poses (N, 6) agree; NaN in all other rows.
         """
         found = np.full((len(m), 6), np.nan)
-        picture = self._pictures(m)
-        corner = self._corners(len(m))
-        known = np.isfinite(m.values).all(axis=1)
-        flat = np.linalg.svd(corner - corner.mean(axis=0), compute_uv=False)
-        fewest = _FEWEST if flat[-1] <= 1e-6 * flat[0] else 6
-        enough = np.bincount(picture[known], minlength=int(picture.max()) + 1) >= fewest
-        used = np.flatnonzero(known & enough[picture])
+        used, number = self._pictures_told(m)
         if not len(used):
             return found
-        _, first, number = np.unique(picture[used], return_index=True, return_inverse=True)
-        boards = board_poses(corner[used], m.values[used], self.lens_numbers(), number.reshape(-1))
+        first = np.unique(number, return_index=True)[1]
+        boards = board_poses(
+            self._corners(len(m))[used], m.values[used], self.lens_numbers(), number
+        )
         seen = boards.pose
         if self.on == "platform":
             seen = twists.inverse(seen.reshape(-1, 6)).reshape(seen.shape)
         found[used[first]] = in_agreement(seen, pose[used[first]])
         return found
+
+    def doubts(self, m: Measured) -> Iterator[str]:
+        """Lenses of turned or rectified pictures, mirrored pictures."""
+        used, number = self._pictures_told(m)
+        if not len(used) or self.lens != "none":
+            return iter(())
+        corner, size = self._corners(len(m))[used], (self.width, self.height)
+        return lens_doubts(corner, m.values[used], self.lens_numbers(), number, size)
+
+    def _pictures_told(self, m: Measured) -> tuple[IntArray, IntArray]:
+        """Rows (n,) of pictures that tell where a board is, and which picture each is of (n,)."""
+        picture, corner = self._pictures(m), self._corners(len(m))
+        known = np.isfinite(m.values).all(axis=1)
+        flat = np.linalg.svd(corner - corner.mean(axis=0), compute_uv=False)
+        fewest = _FEWEST if flat[-1] <= 1e-6 * flat[0] else 6
+        enough = np.bincount(picture[known], minlength=int(picture.max()) + 1) >= fewest
+        used = np.flatnonzero(known & enough[picture])
+        return used, np.unique(picture[used], return_inverse=True)[1].reshape(-1)
 
     def arguments(self, m: Measured) -> dict[str, FloatArray]:
         """What is mounted where, as a simulation was told."""

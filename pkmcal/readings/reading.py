@@ -262,6 +262,10 @@ class Reading:
         at = At(solve(m.actuators, "q").pose, axis=np.full(len(m), 2))
         return self.predict(at, **self.arguments(m)).values
 
+    def doubts(self, m: Measured) -> Iterator[str]:
+        """Say what the readings themselves show to be wrong with them, a sentence each."""
+        return iter(())
+
     # differences ----------------------------------------------------------------------------------
 
     def difference(self, values: FloatArray, predicted: FloatArray) -> FloatArray:
