@@ -159,6 +159,13 @@ class Camera(Reading):
         corner = np.tile(board.places, (len(pictures), 1))
         return np.repeat(pictures, count, axis=0), self.with_fields({"corner": corner})
 
+    def of_poses(self, q: FloatArray) -> tuple[FloatArray, Camera]:
+        """A picture at each: rows of all corners of its board, where they are not stated."""
+        if self.board is None or self.corner is not None:
+            return q, self
+        rows_, seeing = self.seeing(q, self.board)
+        return rows_, seeing.with_fields({"board": None})
+
     # the model ------------------------------------------------------------------------------------
 
     def predict(

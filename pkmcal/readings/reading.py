@@ -257,6 +257,13 @@ class Reading:
         """Give the arguments of `predict` for an instrument whose truth is stated."""
         return {}
 
+    def of_poses(self: Own, q: FloatArray) -> tuple[FloatArray, Own]:
+        """Actuators of the rows, pose by pose, that it reads at each of (N, n); and it, of these.
+
+        By default one row at each.
+        """
+        return q, self
+
     def simulated(self, m: Measured, solve: Solve) -> FloatArray:
         """Compute what the instrument would read without noise, (N, k)."""
         at = At(solve(m.actuators, "q").pose, axis=np.full(len(m), 2))
