@@ -270,10 +270,21 @@ class Reading:
         """Give the arguments of `predict` for an instrument whose truth is stated."""
         return {}
 
+    def of_poses(self: Own, q: FloatArray) -> tuple[FloatArray, Own]:
+        """Actuators of the rows, pose by pose, that it reads at each of (N, n); and it, of these.
+
+        By default one row at each.
+        """
+        return q, self
+
     def simulated(self, m: Measured, solve: Solve) -> FloatArray:
         """Compute what the instrument would read without noise, (N, k)."""
         at = At(solve(m.actuators, "q").pose, axis=np.full(len(m), 2))
         return self.predict(at, **self.arguments(m)).values
+
+    def doubts(self, m: Measured) -> Iterator[str]:
+        """Say what the readings themselves show to be wrong with them, a sentence each."""
+        return iter(())
 
     # differences ----------------------------------------------------------------------------------
 
