@@ -1,23 +1,24 @@
 """A project file: what a window or a folder asks for, as plain TOML.
 
 It says what the options of the verbs say, in tables: ``machine``, ``measured`` and ``fit`` of a
-calibration, ``plan`` of a plan, ``import`` and ``export`` of configurations.
+calibration, ``plan`` of poses to measure.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NoReturn
 
 from pkmcal.exceptions import FileError
 from pkmcal.jobs.calibration import Calibration
+from pkmcal.jobs.plan import Planning
 from pkmcal.jobs.stated import Refuse, refused
 
 VERSION = 1
 _VERSION = "pkmcal-project"
-_CALIBRATION = ("machine", "measured", "fit")
+_TABLES = ("machine", "measured", "fit", "plan")
 _ESCAPES = {'"': '\\"', "\\": "\\\\", "\n": "\\n", "\t": "\\t", "\r": "\\r"}
 
 
@@ -29,6 +30,8 @@ class Project:
     ----------
     calibration : Calibration
         The tables machine, measured and fit.
+    plan : Planning
+        The table plan; its machine is that of the calibration.
 
     Examples
     --------
@@ -49,10 +52,14 @@ class Project:
     """
 
     calibration: Calibration = field(default=Calibration())
+    plan: Planning = field(default=Planning())
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "plan", replace(self.plan, robot=self.calibration.robot))
 
     def table(self) -> dict[str, Any]:
         """What the file says, in plain values."""
-        return {_VERSION: VERSION, **self.calibration.table()}
+        return {_VERSION: VERSION, **self.calibration.table(), **self.plan.table()}
 
     @classmethod
     def of_table(cls, table: Mapping[str, Any], refuse: Refuse | None = None) -> Project:
@@ -68,9 +75,9 @@ class Project:
         if version != VERSION or isinstance(version, bool):
             refuse(_VERSION, f"must be {VERSION}, the version of project files, found {version!r}")
         for key in table:
-            if key not in (_VERSION, *_CALIBRATION):
+            if key not in (_VERSION, *_TABLES):
                 refuse(key, f"unknown key {key!r} of a project")
-        return cls(Calibration.of_table(table, refuse))
+        return cls(Calibration.of_table(table, refuse), Planning.of_table(table, refuse))
 
     def text(self) -> str:
         """The file."""
@@ -97,9 +104,10 @@ class Project:
 
         return cls.of_table(source.data, refuse)
 
-    def within(self, folder: str | Path) -> Project:
+    def in_folder(self, folder: str | Path) -> Project:
         """The same with its relative paths below a folder."""
-        return Project(self.calibration.within(str(folder)))
+        folder = str(folder)
+        return Project(self.calibration.in_folder(folder), self.plan.in_folder(folder))
 
 
 def toml(table: Mapping[str, Any]) -> str:
