@@ -55,3 +55,21 @@ BoardSize = Annotated[
         help="Identify by how much the board is larger than stated, too.",
     ),
 ]
+
+
+CameraAt = Annotated[
+    str | None,
+    typer.Option(
+        metavar="X,Y,Z[,A,B,C]",
+        help="Where it will be, mm: on the base its place; on the platform its pose there, whose z"
+        " is the line of sight.",
+    ),
+]
+LookAt = Annotated[
+    str | None,
+    typer.Option(
+        metavar="X,Y,Z",
+        help="A point of the base: on the base the camera looks at it; on the platform the board"
+        " lies there, facing up.",
+    ),
+]

@@ -8,6 +8,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
+from pkmcal.cli.camera_options import BoardSeen, CameraAt, CameraOn, Lens, LookAt
 from pkmcal.cli.load_options import Yielding
 from pkmcal.cli.options import Force, Free, Json, Prior, RobotOrArm, Seed
 from pkmcal.cli.output import say
@@ -49,8 +50,8 @@ def plan(
         str,
         typer.Option(
             metavar="KIND",
-            help="What is measured: position, pose, height, distance, orientation or closure. Of"
-            " several how many poses of each: position=20,distance=10.",
+            help="What is measured: position, pose, height, distance, orientation, closure or pixel"
+            " (pictures of a board). Of several how many poses of each: position=20,distance=10.",
         ),
     ] = "position",
     target: Annotated[
@@ -98,6 +99,11 @@ def plan(
         ),
     ] = None,
     compliance: Yielding = None,
+    camera: Lens = None,
+    camera_on: CameraOn = "base",
+    board: BoardSeen = None,
+    camera_at: CameraAt = None,
+    look_at: LookAt = None,
     free: Free = None,
     prior: Prior = None,
     unknown: Annotated[

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from pkmcal.jobs.machine import in_folder, machine_of_table, machine_table
-from pkmcal.jobs.stated import PathText, Refuse, Stated, command, of, refused
+from pkmcal.jobs.stated import PathText, Refuse, Stated, below, command, of, refused
 
 
 @dataclass(frozen=True)
@@ -39,6 +39,11 @@ class Planning(Stated):
     payloads: str | None = None
     effects: tuple[str, ...] = ()
     compliance: tuple[str, ...] = ()
+    camera: PathText | None = None
+    camera_on: str = "base"
+    board: str | None = None
+    camera_at: str | None = None
+    look_at: str | None = None
     free: tuple[str, ...] = ()
     prior: tuple[str, ...] = ()
     unknown: tuple[str, ...] = ()
@@ -69,4 +74,7 @@ class Planning(Stated):
 
     def in_folder(self, folder: str) -> Planning:
         """The same with its relative paths below a folder: those of a project file."""
-        return replace(super().in_folder(folder), robot=in_folder(self.robot, folder))
+        found = replace(super().in_folder(folder), robot=in_folder(self.robot, folder))
+        if self.board is None or not self.board.lower().endswith(".csv"):
+            return found
+        return replace(found, board=below(folder, self.board))

@@ -21,6 +21,7 @@ from pkmcal.jobs.geometry_options import free_names, read_prior
 from pkmcal.jobs.inputs import Inputs
 from pkmcal.jobs.load_options import mass, yielding
 from pkmcal.jobs.plan import Planning
+from pkmcal.jobs.planned_camera import planned_camera
 from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.kinematics.reading_units import reading_units
 from pkmcal.kinematics.robot import Robot
@@ -60,6 +61,9 @@ def run(job: Planning, machine: Robot | SerialArm, inputs: Inputs) -> Plan:
     used = None if job.targets is None else _places(machine, inputs.file(job.targets))
     kinds = kinds_of(job)
     several = isinstance(kinds, dict)
+    pictures = planned_camera(job) if kinds == "pixel" else None
+    if pictures is None and (job.camera is not None or job.board is not None):
+        raise ArgumentError("--camera, --board: they are of pictures; state --kind pixel")
     payloads = [] if job.payloads is None else job.payloads.split(",")
     return plan_poses(
         machine,
@@ -68,7 +72,7 @@ def run(job: Planning, machine: Robot | SerialArm, inputs: Inputs) -> Plan:
         accuracy=job.accuracy,
         targets=used,
         criterion=word("--criterion", job.criterion, CRITERIA),
-        kind=kinds,
+        kind=kinds if pictures is None else pictures,
         target=_points(job.target, kinds),
         noise=_noise(job.noise, kinds),
         actuator_noise=job.actuator_noise,
@@ -105,6 +109,8 @@ def kinds_of(job: Planning) -> Kind | dict[Kind, int]:
         No kind, or a number of poses beside those of each kind.
     """
     kinds = _kinds(job.kind)
+    if isinstance(kinds, dict) and "pixel" in kinds:
+        raise ArgumentError(f"--kind {job.kind}: pictures are planned by themselves")
     if isinstance(kinds, dict) and (job.count is not None or job.accuracy is not None):
         raise ArgumentError(
             f"--kind {job.kind}: says how many poses, without --count and --accuracy"
