@@ -1,0 +1,127 @@
+"""The project of a window: a folder with the user's files, and one plain file that says what is asked.
+
+Nothing else is a state. The file is written whole at every change; every change has a number, so
+that of two tabs that change the same state the second is told.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pkmcal.app.names import safe_name
+from pkmcal.exceptions import ArgumentError
+from pkmcal.files.atomic import write_whole
+from pkmcal.jobs.project import Project
+
+FILE = "project.toml"
+OWN = (FILE, "robot.toml", "commands.csv")  # names that are pkmcal's; a user's file gets another
+MOST_FILE, MOST_FOLDER = 100_000_000, 1_000_000_000  # bytes
+_UNDO = 100
+
+
+class Folder:
+    """A project and its versions.
+
+    Parameters
+    ----------
+    path : Path
+        Made if it is not there. A project file in it is read.
+
+    Raises
+    ------
+    ValueError
+        A project file with a mistake, with its line.
+    """
+
+    def __init__(self, path: Path) -> None:
+        path.mkdir(parents=True, exist_ok=True)
+        self.path = path.resolve()
+        file = self.path / FILE
+        text = file.read_bytes() if file.is_file() else Project().text().encode()
+        self.project = Project.of_text(text, str(file))
+        self.version = 1
+        self._before: list[Project] = []
+
+    @property
+    def files(self) -> list[str]:
+        """The user's files, by name."""
+        return sorted(each.name for each in self.path.iterdir() if self._is_users(each))
+
+    def change(self, table: Mapping[str, Any], version: object) -> bool:
+        """Take a whole new state, written at once; False where another was first.
+
+        Raises
+        ------
+        ValueError
+            A key or value that is none, or a file that is not in the folder.
+        """
+        if version != self.version:
+            return False
+        project = Project.of_table(table)
+        self._inside(project)
+        if project != self.project:
+            self._before = [*self._before, self.project][-_UNDO:]
+            self._take(project)
+        return True
+
+    def undo(self, version: object) -> bool:
+        """Go back to the state before; False where there is none or another was first."""
+        if version != self.version or not self._before:
+            return False
+        self._take(self._before.pop())
+        return True
+
+    @property
+    def undoable(self) -> bool:
+        """Whether there is a state before."""
+        return bool(self._before)
+
+    def store(self, name: str, content: Path) -> str:
+        """Take a file that was sent, and return the name that it has here."""
+        name = safe_name(name)
+        if name in OWN or name.endswith(".part"):
+            name = f"my_{name}"
+        content.replace(self.path / name)
+        return name
+
+    def written(self, path: str) -> Path | None:
+        """Return a file of the folder that may be taken away, or None."""
+        if "\0" in path:
+            return None
+        found = (self.path / path).resolve()
+        if not found.is_relative_to(self.path) or not found.is_file():
+            return None
+        hidden = any(part.startswith(".") for part in found.relative_to(self.path).parts)
+        return None if hidden else found
+
+    def used(self) -> int:
+        """Bytes of all files."""
+        return sum(each.lstat().st_size for each in self.path.rglob("*") if each.is_file())
+
+    def _take(self, project: Project) -> None:
+        write_whole(self.path / FILE, project.text().encode())
+        self.project = project
+        self.version += 1
+
+    def _inside(self, project: Project) -> None:
+        """Refuse files that are not in the folder."""
+        for name in _named(project):
+            parts = Path(name).parts
+            inside = parts and not Path(name).is_absolute() and ".." not in parts
+            if not inside or self.written(name) is None:
+                raise ArgumentError(f"there is no file {json.dumps(name)} in this project")
+
+    @staticmethod
+    def _is_users(path: Path) -> bool:
+        return path.is_file() and not path.name.startswith(".") and path.name != FILE
+
+
+def _named(project: Project) -> list[str]:
+    """Return the files that a project names, the machine's first."""
+    job, reading = project.calibration, project.calibration.reading
+    machine = job.table().get("machine", {}).get("file")
+    others = (reading.controller, reading.columns, reading.camera, job.held_file)
+    return [name for name in (machine, *job.files, *others) if name]

@@ -1,0 +1,246 @@
+"""What the window computes: a machine and its picture, a plan, files as read, a fit, what is taken away.
+
+Each operation takes the table of the project and what the page gives besides, and returns plain
+data. Words of results are those of the package.
+"""
+
+from __future__ import annotations
+
+import difflib
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import pkmcal as pk
+from pkmcal.app import telling
+from pkmcal.app.commands import REPORT
+from pkmcal.checks.check_geometry import check_geometry
+from pkmcal.exceptions import ArgumentError, Error
+from pkmcal.files.reading import MOST_TABLE
+from pkmcal.jobs import calibrating
+from pkmcal.jobs.calibration import Writing
+from pkmcal.jobs.inputs import Inputs
+from pkmcal.jobs.project import Project
+from pkmcal.jobs.stated import quoted
+from pkmcal.jobs.written import Written
+from pkmcal.view import page
+
+Table = dict[str, Any]
+Say = Callable[..., None]
+_LINES = 12  # of a file that are shown as they are
+_CANDIDATES = 500
+
+
+@dataclass
+class Work:
+    """What was read and fitted last, to be quicker.
+
+    Attributes
+    ----------
+    key : object
+        What was read depends on it: the calibration's sources and the files' times.
+    """
+
+    key: object = None
+    inputs: Inputs = field(default_factory=Inputs)
+    sources: calibrating.Sources | None = None
+    notes: list[str] = field(default_factory=list)
+    found: pk.Identification | None = None
+    fitted: object = None
+
+    def read(self, project: Project) -> calibrating.Sources:
+        """Read the files of a calibration, if they or what is asked of them changed."""
+        job = project.calibration
+        key = (job.sources, tuple(sorted((each.name, each.stat().st_mtime_ns, each.stat().st_size)
+                                         for each in Path().glob("*") if each.is_file())))  # fmt: skip
+        if self.sources is None or key != self.key:
+            inputs, notes = Inputs(), []
+            self.sources = calibrating.read(job, inputs, notes.append)
+            self.key, self.inputs, self.notes = key, inputs, notes
+            self.fitted = None
+        return self.sources
+
+    def fit(self, project: Project) -> pk.Identification:
+        """Identify, if anything changed since."""
+        sources = self.read(project)
+        asked = (self.key, project.calibration)
+        if self.found is None or self.fitted != asked:
+            given = calibrating.arguments(project.calibration, sources, self.notes.append)
+            self.found = calibrating.identified(sources, given)
+            self.fitted = asked
+        return self.found
+
+
+def machine(work: Work, state: Table, given: Table, say: Say) -> Table:
+    """Take in a firmware's configuration, check the machine, and show it."""
+    project = Project.of_table(state)
+    notes: list[str] = []
+    if project.importing is not None:
+        say("reading the configuration")
+        notes = _run([*project.importing.argv(), "--force"])
+    robot = pk.load(Inputs().robot(project.calibration.robot))
+    say("drawing the machine", 0.5)
+    found = check_geometry(robot)
+    probe = Path("machine", "probe.csv")
+    stored = project.importing is not None and probe.is_file()
+    return {
+        "name": robot.name,
+        "findings": [telling.finding(each) for each in found.findings],
+        "notes": notes,
+        "stored": str(probe) if stored else "",
+        "free": list(telling.free(robot)),
+        "view": page.machine(robot),
+    }
+
+
+def plan(work: Work, state: Table, given: Table, say: Say) -> Table:
+    """Choose poses, and write them as the command does."""
+    project = Project.of_table(state)
+    say("choosing poses")
+    lines = _run([*project.planning.argv(), "--force"])
+    table = np.genfromtxt(project.planning.commands, delimiter=",", skip_header=1, comments="#")
+    return {"text": lines, "file": str(project.planning.commands), "rows": len(np.atleast_2d(table))}
+
+
+def look(work: Work, state: Table, given: Table, say: Say) -> Table:
+    """Show files as they are and as they are understood; a mistake is marked in its line."""
+    project = Project.of_table(state)
+    job = project.calibration
+    names = [*job.files, *filter(None, [job.reading.controller])]
+    found: Table = {"files": {name: _head(name) for name in names}}
+    try:
+        sources = work.read(project)
+    except (Error, OSError) as error:
+        return {**found, "error": told(error)}
+    measured = sources.measured
+    return {
+        **found,
+        "notes": [*work.notes, *(note for each in measured for note in each.notes)],
+        "text": [str(each) for each in measured],
+        "rows": sum(map(len, measured)),
+    }
+
+
+def fit(work: Work, state: Table, given: Table, say: Say) -> Table:
+    """Calibrate: the verdict, the table, rows and numbers, the machine with its residuals."""
+    project = Project.of_table(state)
+    say("reading", 0.1)
+    work.read(project)
+    say("identifying", 0.2)
+    found = work.fit(project)
+    say("judging", 0.7)
+    return telling.calibration(found, project.calibration, _lines(work))
+
+
+def out(work: Work, state: Table, given: Table, say: Say) -> Table:
+    """Write the calibrated machine and the configuration, and say what changes in it."""
+    project = Project.of_table(state)
+    found = work.fit(project)
+    _written(work, project, found, Writing(out=REPORT, force=True))
+    files = [_file(f"{REPORT}/robot.toml", "the calibrated machine")]
+    changed: list[str] = []
+    for number, export in enumerate(project.exports):
+        say(f"writing {export.out}", 0.3 + 0.6 * number / len(project.exports))
+        lines = _run([*export.argv(), "--force"])
+        files.insert(0, _file(str(export.out), *lines))
+        if export.config:
+            old, new = (Path(each).read_text("utf-8", "replace").splitlines()
+                        for each in (export.config, export.out))  # fmt: skip
+            changed += difflib.unified_diff(old, new, export.config, str(export.out), n=1, lineterm="")
+    return {"files": files, "changed": changed}
+
+
+def report(work: Work, state: Table, given: Table, say: Say) -> Table:
+    """Write the report; with a certificate where its statements are given."""
+    project = Project.of_table(state)
+    found = work.fit(project)
+    certificate = given.get("certificate")
+    if certificate:
+        say("certificate", 0.1)
+        Path("certificate.toml").write_text(telling.certificate(certificate), encoding="utf-8")
+    say("report", 0.3)
+    asked = Writing(
+        report=REPORT, certificate="certificate.toml" if certificate else None, force=True
+    )
+    _written(work, project, found, asked)
+    command = quoted([*project.calibration.argv(), *asked.options()])
+    return {"files": [_file(f"{REPORT}/report.html", "the report, one file that needs no network"),
+                      _file(f"{REPORT}/report.json", "all results as data")],
+            "command": command}  # fmt: skip
+
+
+def wait(work: Work, state: Table, given: Table, say: Say) -> Table:
+    """Do nothing for ten seconds, for tests of stopping."""
+    for step in range(100):
+        say("waiting", step / 100)
+        time.sleep(0.1)
+    return {}
+
+
+def crash(work: Work, state: Table, given: Table, say: Say) -> Table:
+    """End by a signal, for tests of what follows."""
+    os.kill(os.getpid(), signal.SIGSEGV)
+    return {}
+
+
+OPERATIONS: dict[str, Callable[[Work, Table, Table, Say], Table]] = {
+    each.__name__: each for each in (machine, plan, look, fit, out, report, wait, crash)
+}
+
+
+def told(error: BaseException) -> Table:
+    """Return an error's words, and the file, line and column that it names."""
+    found: Table = {"message": str(error)}
+    for name in ("file", "line", "column"):
+        value = getattr(error, name, None)
+        if isinstance(value, str | int):
+            found[name] = value
+    return found
+
+
+def _written(work: Work, project: Project, found: pk.Identification, asked: Writing) -> None:
+    sources = work.read(project)
+    written = Written.planned(asked, project.calibration.robot, sources.robot, work.inputs)
+    if written.machine is not None:
+        written.write_machine(found)
+    if written.report is not None:
+        written.write_report(found)
+
+
+def _run(argv: list[str]) -> list[str]:
+    """Run a command as the terminal does, and return the lines that it prints."""
+    done = subprocess.run([sys.executable, "-m", *argv], capture_output=True, text=True,
+                          encoding="utf-8", check=False)  # fmt: skip
+    if done.returncode not in (0, 1):
+        raise ArgumentError(done.stderr.strip().removeprefix("pkmcal: ") or done.stdout.strip())
+    return [*done.stdout.strip().splitlines(), *done.stderr.strip().splitlines()]
+
+
+def _head(name: str) -> list[str]:
+    """Return the first lines of a file, as text whatever is in it."""
+    with open(name, "rb") as file:
+        begin = file.read(min(MOST_TABLE, 8192))
+    return begin.decode("utf-8", "replace").splitlines()[:_LINES]
+
+
+def _file(name: str, *words: str) -> Table:
+    return {"file": name, "what": " ".join(words)}
+
+
+def _lines(work: Work) -> list[tuple[str, int]]:
+    """Return the file and line of each measured row, in the order of the rows."""
+    assert work.sources is not None
+    found: list[tuple[str, int]] = []
+    for each in work.sources.measured:
+        lines = getattr(each, "lines", None)
+        numbers = [-1] * len(each) if lines is None else [int(one) for one in lines]
+        found += [(Path(str(each.file)).name, one) for one in numbers]
+    return found
