@@ -202,6 +202,7 @@ $(TESTS): $(SOURCES) | $(BIN)/pip
 	$(PREREQUISITES)
 	@echo "installing pkmcal and its tests in $(VENV) and compiling its core: some two minutes of processor time"
 	$(PIP) install --editable ".[test,lint]"
+	$(PIP) install --no-deps --upgrade --target $(VENV)/opencv4 "opencv-python-headless>=4.8,<5" # beside 5
 	@$(SHOW_TYPES)
 	@touch $@ $(PACKAGE)
 

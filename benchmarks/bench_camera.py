@@ -114,7 +114,7 @@ def instrument(scenario: Scenario) -> tuple[Camera, Board]:
     grid = Board.chessboard(10, 5, scenario.pitch)
     board = Board.points(grid.ids.tolist(), grid.places - grid.places.mean(axis=0))
     stands = pk.screw.to_pose(looking(np.array(scenario.eye), np.array(scenario.at)))
-    carried: tuple[float, ...] = (10, -15, 20, 0.03, -0.02, 0.3)
+    carried: tuple[float, ...] = (10, -15, 20, np.pi + 0.03, -0.02, 0.3)
     if scenario.on == "platform":
         x, y, z = scenario.at
         board_at = pk.screw.from_pose(np.array([x + 40, y - 30, z + 700, 0.05, -0.04, 0.2]))

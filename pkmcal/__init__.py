@@ -106,6 +106,9 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.planning.plan_poses import Plan as Plan
     from pkmcal.planning.plan_poses import plan_poses as plan_poses
     from pkmcal.view.show import show as show
+    from pkmcal.vision.detect import Detection as Detection
+    from pkmcal.vision.detect import detect as detect
+    from pkmcal.vision.printed import print_board as print_board
 
 _HOMES = {
     "arms.arm": ("SerialArm",),
@@ -172,6 +175,8 @@ _HOMES = {
     "moves.jumps": ("Jump",),
     "moves.move": ("Move", "MoveSample"),
     "view.show": ("show",),
+    "vision.detect": ("Detection", "detect"),
+    "vision.printed": ("print_board",),
 }
 _HOME_OF = {name: f"pkmcal.{home}" for home, names in _HOMES.items() for name in names}
 _MODULES = ("export", "readings", "screw", "trajectory")

@@ -60,10 +60,21 @@ BELTS = pk.load(Path(__file__).parents[1] / "examples" / "belts" / "robot.toml")
 PLACES = np.random.default_rng(0).uniform(-200, 200, (12, 6)) * [1, 1, 0, 0, 0, 0]
 ANGLES = np.linspace(0, 2 * np.pi, 60)
 CIRCLE = 100.0 * np.column_stack([np.cos(ANGLES), np.sin(ANGLES)])
+BOARD = pk.readings.Board.chessboard(4, 3, 10)
 CALLS: dict[str, Call] = {
     "load": (pk.load, {"robot": "hexapod"}, {"robot": "path"}),
     "import_printer": (pk.import_printer, {"path": PRINTER}, {"path": "path"}),
     "import_comp_file": (pk.import_comp_file, {"path": SCREW}, {"path": "path"}),
+    "detect": (
+        pk.detect,
+        {"images": "pictures", "board": BOARD},
+        {"images": "path", "board": "robot", "camera": "robot", "progress": "function"},
+    ),
+    "print_board": (
+        pk.print_board,
+        {"board": BOARD, "path": "board.pdf"},
+        {"board": "robot", "path": "path", "margin": "count"},
+    ),
     "circular_test": (
         pk.circular_test,
         {"path": CIRCLE, "radius": 100.0},
@@ -518,7 +529,7 @@ CALLS: dict[str, Call] = {
         },
     ),
 }
-NOT_HERE = {"path", "folder"}  # files of these calls do not exist, or would be written
+NOT_HERE = {"path", "folder", "images"}  # files of these calls do not exist, or would be written
 EVERY = [(name, argument) for name, (_, _, kinds) in CALLS.items() for argument in kinds]
 
 
@@ -547,6 +558,7 @@ def test_every_public_call_is_among_them() -> None:
     results = {  # made by calls, not by users
         *("Allocation", "ArmInverse", "Assemblies", "Bootstrap", "Certificate", "Compensation"),
         *("CircularTest", "Datum", "Drift", "LawTest", "ScrewTable", "SlackCable", "Tensions"),
+        "Detection",
         "MeasuringOrder",
         *(
             "CorrectedProgram",

@@ -89,13 +89,21 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "site"
 
 
+def test_every_room_is_packed() -> None:
+    said = (ROOT / "pyproject.toml").read_text(encoding="utf-8").partition("packages = [")[2]
+    packed = set(re.findall(r'"(pkmcal[.a-z_]*)"', said.partition("]")[0]))
+    rooms = {path.parent.relative_to(ROOT) for path in ROOT.glob("pkmcal/**/__init__.py")}
+    beside = {"pkmcal.derive", "pkmcal.generated", "pkmcal.examples"}
+    assert packed == {".".join(room.parts) for room in rooms} | beside
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("source", "pattern", "installed"),
     [
         ("pkmcal", "**/*.py", "pkmcal"),
-        ("pkmcal", "machines/*.toml", "pkmcal"),
-        ("pkmcal", "arms/*.toml", "pkmcal"),
+        ("pkmcal", "builtin/machines/*.toml", "pkmcal"),
+        ("pkmcal", "builtin/arms/*.toml", "pkmcal"),
         ("pkmcal", "py.typed", "pkmcal"),
         ("derive", "**/*.py", "pkmcal/derive"),
         ("generated", "*.h", "pkmcal/generated"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -9,7 +10,6 @@ import numpy as np
 import typer
 
 import pkmcal as pk
-from pkmcal.cli.inputs import Inputs
 from pkmcal.cli.measured import (
     Columns,
     Controller,
@@ -17,19 +17,22 @@ from pkmcal.cli.measured import (
     InvertPoses,
     JoinBy,
     ProbeOffset,
-    Reading,
     Rename,
     Rotation,
     Units,
 )
 from pkmcal.cli.options import Json, RobotOrArm
-from pkmcal.cli.output import say
+from pkmcal.cli.output import say, tell
 from pkmcal.display import first_rows
+from pkmcal.jobs.inputs import Inputs
+from pkmcal.jobs.read_files import read_file
+from pkmcal.jobs.reading import Reading
 from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.report.as_json import as_json
 
 
 def check(
+    context: typer.Context,
     robot: RobotOrArm,
     measurements: Annotated[
         Path | None,
@@ -59,10 +62,9 @@ def check(
     machine = pk.load(read.robot(robot))
     measured = None
     if measurements is not None:
-        reading = Reading(
-            controller, join, ignore, rename, columns, units, rotation, probe_offset, invert_poses
-        )
-        measured = reading.measurements(measurements, read, as_machine(machine))
+        given = {**asdict(Reading()), **context.params}  # a camera is for `calibrate`
+        file, reading = str(measurements), Reading.of_options(given)
+        measured = read_file(file, as_machine(machine), reading, read, tell)
     found = pk.check_geometry(machine)
     unsolved: list[int] = []
     if measured is not None:

@@ -15,23 +15,19 @@ import typer
 import pkmcal as pk
 from pkmcal.arguments import word
 from pkmcal.arrays import FloatArray
-from pkmcal.cli.inputs import Inputs
-from pkmcal.cli.load_options import (
-    Payload,
-    PayloadAt,
-    ToolForce,
-    ToolLoads,
-    carrying,
-    loads_by_tool,
-)
+from pkmcal.cli.load_options import Payload, PayloadAt, ToolForce, ToolLoads
 from pkmcal.cli.options import Force, Json, ParallelRobot, Seed
-from pkmcal.cli.output import Output, say
-from pkmcal.cli.rows import POSE_UNITS, numbers_on_line
+from pkmcal.cli.output import say
+from pkmcal.cli.rows import POSE_UNITS
 from pkmcal.compensation.compensate import Method, Orientation
 from pkmcal.compensation.program import GcodeFirmware
 from pkmcal.core.library import POSE
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.csv_table import Table
+from pkmcal.jobs.inputs import Inputs
+from pkmcal.jobs.load_options import carrying, loads_by_tool
+from pkmcal.jobs.output import Output
+from pkmcal.jobs.rows import numbers_on_line
 from pkmcal.kinematics.robot import Robot
 from pkmcal.loading import load_parallel
 from pkmcal.measurements.pose_csv import read_poses, write_poses

@@ -17,12 +17,13 @@ from pkmcal.arguments import checked_seed
 from pkmcal.arrays import FloatArray, rms
 from pkmcal.calibration.identification import Identification
 from pkmcal.calibration.identify import identify
-from pkmcal.cli.inputs import Inputs
 from pkmcal.cli.options import Force, Json, Seed
-from pkmcal.cli.output import Output, say, seal
+from pkmcal.cli.output import say
 from pkmcal.cli.progress import progress
 from pkmcal.files import provenance
 from pkmcal.files.atomic import write_whole
+from pkmcal.jobs.inputs import Inputs
+from pkmcal.jobs.output import Output, seal
 from pkmcal.kinematics.robot import Robot
 from pkmcal.loading import load
 from pkmcal.measurements.measurements import Measurements

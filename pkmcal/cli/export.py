@@ -9,13 +9,14 @@ import typer
 
 import pkmcal as pk
 from pkmcal.arguments import word
-from pkmcal.cli.inputs import Inputs
 from pkmcal.cli.options import Force, Json, ParallelRobot
-from pkmcal.cli.output import Output, say
+from pkmcal.cli.output import say
 from pkmcal.controllers.linuxcnc import contents
 from pkmcal.controllers.loss import laws
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.reading import Input
+from pkmcal.jobs.inputs import Inputs
+from pkmcal.jobs.output import Output
 from pkmcal.loading import load_parallel
 from pkmcal.report.as_json import as_json
 

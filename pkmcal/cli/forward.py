@@ -9,13 +9,16 @@ import numpy as np
 import typer
 
 import pkmcal as pk
-from pkmcal.cli.inputs import Inputs
-from pkmcal.cli.load_options import Payload, PayloadAt, ToolForce, carrying
+from pkmcal.cli.load_options import Payload, PayloadAt, ToolForce
 from pkmcal.cli.options import Force, Json, Radians, RobotOrArm
-from pkmcal.cli.output import Output, say
-from pkmcal.cli.rows import POSE_UNITS, numbers_on_line, table
+from pkmcal.cli.output import say
+from pkmcal.cli.rows import POSE_UNITS, table
 from pkmcal.core.library import POSE, STATUS
 from pkmcal.exceptions import ArgumentError
+from pkmcal.jobs.inputs import Inputs
+from pkmcal.jobs.load_options import carrying
+from pkmcal.jobs.output import Output
+from pkmcal.jobs.rows import numbers_on_line
 from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.kinematics.reading_units import reading_units
 from pkmcal.measurements.command_csv import read_commands

@@ -9,10 +9,11 @@ import typer
 
 import pkmcal as pk
 from pkmcal.arguments import word
-from pkmcal.cli.inputs import Inputs
 from pkmcal.cli.options import Force, Json
-from pkmcal.cli.output import Output, say
+from pkmcal.cli.output import say
 from pkmcal.controllers.firmwares import Firmware
+from pkmcal.jobs.inputs import Inputs
+from pkmcal.jobs.output import Output
 from pkmcal.kinematics.reading_units import reading_units
 from pkmcal.measurements.measurement_writer import write_measurements
 from pkmcal.measurements.measurements import Measurements

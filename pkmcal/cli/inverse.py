@@ -7,12 +7,15 @@ from typing import Annotated
 
 import typer
 
-from pkmcal.cli.inputs import Inputs
-from pkmcal.cli.load_options import Payload, PayloadAt, ToolForce, carrying
+from pkmcal.cli.load_options import Payload, PayloadAt, ToolForce
 from pkmcal.cli.options import Force, Json, ParallelRobot, Radians
-from pkmcal.cli.output import Output, say
-from pkmcal.cli.rows import POSE_UNITS, numbers_on_line, table
+from pkmcal.cli.output import say
+from pkmcal.cli.rows import POSE_UNITS, table
 from pkmcal.cli.taken import Taken
+from pkmcal.jobs.inputs import Inputs
+from pkmcal.jobs.load_options import carrying
+from pkmcal.jobs.output import Output
+from pkmcal.jobs.rows import numbers_on_line
 from pkmcal.kinematics.reading_units import reading_units
 from pkmcal.loading import load_parallel
 from pkmcal.measurements.command_csv import write_commands

@@ -33,7 +33,8 @@ def main() -> None:
         codecs.register_error("as in JSON", _escaped)
         # a terminal without σ gets "?", who reads JSON gets an escape
         sys.stdout.reconfigure(errors="as in JSON" if "--json" in sys.argv else "replace")
-    try:
+    try:  # an environment that is wrong is said before anything else
+        import pkmcal.core.library  # noqa: F401
         from pkmcal.cli.verbs import app
     except Exception as error:
         sys.exit(ending.code(error))

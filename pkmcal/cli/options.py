@@ -10,6 +10,7 @@ import typer
 from pkmcal.geometry import robot_file
 from pkmcal.loading import machines
 
+FREE = "What is free, and what is known of it"  # a panel of options
 _ROBOT = "A built-in machine or a robot file."
 
 
@@ -36,14 +37,17 @@ BuiltIn = Annotated[
 Free = Annotated[
     list[str] | None,
     typer.Option(
+        rich_help_panel=FREE,
         metavar="NAME",
         help="Identify this number instead of the robot's default set. Repeat it, separate names"
-        " with commas, or use wildcards: 'rod*,radius'. none: only where instruments stand.",
+        " with commas, or use wildcards: 'rod*,radius'. default: that set;"
+        " none: only where instruments stand.",
     ),
 ]
 Prior = Annotated[
     list[str] | None,
     typer.Option(
+        rich_help_panel=FREE,
         metavar="[NAME=]σ",
         help="Standard deviation of a number before anything is measured: 'base*=0.5',"
         " 'angle1=0.1deg'. Without a name, in mm, of all. What a tape says of a length:"
@@ -53,6 +57,7 @@ Prior = Annotated[
 Uncertainty = Annotated[
     list[str] | None,
     typer.Option(
+        rich_help_panel=FREE,
         metavar="NAME=σ[,common]",
         help="How wrong a number may be that is not found, one standard deviation: 'gain*=1e-3',"
         " 'target*=0.1', scale=20e-6 of the instrument. It is fitted along within that. common:"
@@ -62,6 +67,7 @@ Uncertainty = Annotated[
 Consider = Annotated[
     list[str] | None,
     typer.Option(
+        rich_help_panel=FREE,
         metavar="NAME=σ",
         help="The same of a number that has to stay where it is: ± alone allow for it.",
     ),

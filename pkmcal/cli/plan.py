@@ -13,17 +13,19 @@ import typer
 from pkmcal.arguments import did_you_mean, word
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray
-from pkmcal.cli.effects_option import AUTO, OPTION, read_effects
-from pkmcal.cli.geometry_options import free_names, read_prior
-from pkmcal.cli.inputs import Inputs
-from pkmcal.cli.load_options import Yielding, mass, yielding
+from pkmcal.cli.load_options import Yielding
 from pkmcal.cli.options import Force, Free, Json, Prior, RobotOrArm, Seed
-from pkmcal.cli.output import Output, say
+from pkmcal.cli.output import say
 from pkmcal.cli.progress import progress
 from pkmcal.core.library import COORDINATE_UNITS
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.number_text import typed
 from pkmcal.geometry.box import Box
+from pkmcal.jobs.effects_option import AUTO, OPTION, read_effects
+from pkmcal.jobs.geometry_options import free_names, read_prior
+from pkmcal.jobs.inputs import Inputs
+from pkmcal.jobs.load_options import mass, yielding
+from pkmcal.jobs.output import Output
 from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.kinematics.reading_units import reading_units
 from pkmcal.kinematics.robot import Robot

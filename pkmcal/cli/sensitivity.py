@@ -12,15 +12,16 @@ import numpy as np
 import typer
 
 import pkmcal as pk
-from pkmcal.cli.inputs import Inputs
 from pkmcal.cli.options import Force, Json, ParallelRobot, Poses, Seed
-from pkmcal.cli.output import Output, say
+from pkmcal.cli.output import say
 from pkmcal.cli.progress import progress
 from pkmcal.core.library import POSE
 from pkmcal.error_model.sensitivity import STUDIES, Sensitivity, Study, study_cases
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.atomic import write_whole
 from pkmcal.files.toml_table import LARGEST
+from pkmcal.jobs.inputs import Inputs
+from pkmcal.jobs.output import Output
 from pkmcal.loading import load_parallel
 from pkmcal.measurements.pose_csv import read_poses, write_poses
 from pkmcal.report.as_json import as_json

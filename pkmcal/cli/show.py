@@ -8,9 +8,10 @@ from typing import Annotated
 import typer
 
 import pkmcal as pk
-from pkmcal.cli.inputs import Inputs
 from pkmcal.cli.options import Force, Json, RobotOrArm
-from pkmcal.cli.output import Output, say
+from pkmcal.cli.output import say
+from pkmcal.jobs.inputs import Inputs
+from pkmcal.jobs.output import Output
 from pkmcal.report.as_json import as_json
 
 

@@ -10,19 +10,14 @@ import typer
 
 import pkmcal as pk
 from pkmcal.arrays import FloatArray
-from pkmcal.cli.inputs import Inputs
-from pkmcal.cli.load_options import (
-    Payload,
-    PayloadAt,
-    ToolForce,
-    Yielding,
-    carrying,
-    three,
-    yielding,
-)
+from pkmcal.cli.load_options import Payload, PayloadAt, ToolForce, Yielding
 from pkmcal.cli.options import Force, Json, ParallelRobot, Radians, Seed
-from pkmcal.cli.output import Output, say
-from pkmcal.cli.rows import POSE_UNITS, numbers_on_line
+from pkmcal.cli.output import say
+from pkmcal.cli.rows import POSE_UNITS
+from pkmcal.jobs.inputs import Inputs
+from pkmcal.jobs.load_options import carrying, three, yielding
+from pkmcal.jobs.output import Output
+from pkmcal.jobs.rows import numbers_on_line
 from pkmcal.loading import load_parallel
 from pkmcal.measurements.pose_csv import read_poses, write_poses
 from pkmcal.report.as_json import as_json

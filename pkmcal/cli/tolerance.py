@@ -11,15 +11,16 @@ import typer
 
 import pkmcal as pk
 from pkmcal.arrays import FloatArray
-from pkmcal.cli.geometry_options import read_deviations
-from pkmcal.cli.inputs import Inputs
 from pkmcal.cli.options import Force, Json, ParallelRobot, Poses, Seed
-from pkmcal.cli.output import Output, say
+from pkmcal.cli.output import say
 from pkmcal.cli.progress import progress
 from pkmcal.error_model.sensitivity import own_names
 from pkmcal.error_model.tolerance import Sigma, Tolerance
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.toml_table import LARGEST
+from pkmcal.jobs.geometry_options import read_deviations
+from pkmcal.jobs.inputs import Inputs
+from pkmcal.jobs.output import Output
 from pkmcal.kinematics.robot import Robot
 from pkmcal.kinematics.workspace import reach
 from pkmcal.loading import load_parallel

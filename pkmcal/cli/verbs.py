@@ -22,6 +22,8 @@ _VERBS = {  # where each is: file and function
     "sensitivity": "sensitivity.sensitivity",
     "tolerance": "tolerance.tolerance",
     "plan": "plan.plan",
+    "board": "board.board",
+    "detect": "detect.detect",
     "calibrate": "calibrate.calibrate",
     "compensate": "compensate.compensate",
     "export": "export.export",

@@ -13,6 +13,7 @@ from pkmcal.diagnostics import (
     near_copies,
     noise,
     priors,
+    readings,
     refitted_readings,
     regions,
     rounded,
@@ -25,7 +26,7 @@ from pkmcal.diagnostics import (
 from pkmcal.diagnostics.diagnosis import verified
 
 CHECKS = verified((
-    *held_out.CHECKS, *units.CHECKS, *refitted_readings.CHECKS, *families.CHECKS,
+    *held_out.CHECKS, *readings.CHECKS, *units.CHECKS, *refitted_readings.CHECKS, *families.CHECKS,
     *machine.CHECKS, *loads.CHECKS, *search.CHECKS, *rows.CHECKS, *near_copies.CHECKS,
     *rounded.CHECKS, *noise.CHECKS, *priors.CHECKS, *course.CHECKS, *causes.CHECKS,
     *regions.CHECKS, *gain.CHECKS, *sag.CHECKS, *waves.CHECKS,

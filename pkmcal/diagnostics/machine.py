@@ -22,7 +22,6 @@ FAR = 0.25  # share of the machine's size by which errors of manufacture do not 
 _BEYOND = 0.01  # share of a stroke by which errors of a machine may carry it beyond its ends
 _SHRUNK = 0.02  # share of its size by which errors of manufacture do not shrink a machine
 _REMOTE = 3.0  # times a machine's reach within which a point of its platform is
-_NO_LENGTH = {"touch", "orientation", "tilt", "angle", "closure"}  # kinds that read none
 
 
 def far_numbers(found: Solution) -> dict[str, float]:
@@ -89,10 +88,11 @@ def _shrunk(found: Solution) -> tuple[float, ...]:
     Touches of a point, a line or a plane do not: a smaller machine makes all their misfits smaller.
     """
     fit = found.fit
-    kinds = {measured.kind for measured in fit.equations.table.sets}
-    pairs = zip(fit.equations.table.sets, fit.equations.table.pose_of, strict=True)
-    touching = [place for measured, place in pairs if measured.kind == "touch"]
-    if not kinds <= _NO_LENGTH or not touching:
+    sets = fit.equations.table.sets
+    pairs = zip(sets, fit.equations.table.pose_of, strict=True)
+    touching = [place for measured, place in pairs if measured.instrument.shrinks]
+    lengths = any(set(m.instrument.units) - {"rad"} for m in sets if not m.instrument.shrinks)
+    if lengths or not touching:
         return ()
     rows = np.concatenate(touching)
     spans = []

@@ -8,6 +8,7 @@ from pkmcal.diagnostics.check import Check, Remedy, at_most_one
 from pkmcal.estimation.estimator import FEW, LEAST_FREEDOM
 from pkmcal.estimation.set_noise import apart
 from pkmcal.fitted.solution import Solution
+from pkmcal.readings.reading import Reading
 from pkmcal.statistics.covariance import spare
 from pkmcal.statistics.distributions import chi2_tail, deviation_interval
 from pkmcal.statistics.holdout_test import CHANCE
@@ -28,8 +29,8 @@ def _few_spare(found: Solution) -> tuple[float, ...]:
 
 
 def _few_spare_text(found: Solution, freedom: float) -> str:
-    heights = all(m.kind == "height" for m in found.fit.equations.table.sets)
-    more = "probe 20 points or more" if heights else "measure more poses"
+    advice = {measured.instrument.more for measured in found.fit.equations.table.sets}
+    more = advice.pop() if len(advice) == 1 else Reading.more
     if not found.fit.uncertainty.known:
         return (
             f"as many numbers as equations: nothing shows how good the fit is; {more}, or state"
@@ -94,8 +95,7 @@ def _unlike_sets(found: Solution) -> tuple[dict[int, float], ...]:
 def _unlike_sets_text(found: Solution, ratios: dict[int, float]) -> str:
     sets = found.fit.equations.table.sets
     parts = " and ".join(
-        f"{'touch_distances' if sets[i].kind == 'touch-distance' else f'measurements {i + 1}'} are"
-        f" {ratio:.2g}"
+        f"{sets[i].instrument.argument or f'measurements {i + 1}'} are {ratio:.2g}"
         for i, ratio in ratios.items()
     )
     return (

@@ -31,6 +31,7 @@ _STRAIGHT = 12  # of these, as if equations were straight; then as they bend
 _NEAR = 1e-4  # share of the way on which equations are as large as what is left, to see them bend
 _SETTLED = 1e-12  # share of a pose's cost that a further step would gain
 _CLOSE = 1e-6  # the same where steps have become too short to gain anything
+_TOLD = 1e-6  # share of an equation that is left of it, to tell anything
 _ROUNDING = 1e-15  # of the largest number that equations are made of
 _RIDGE = 1e-13  # of a normal matrix, for unknowns that no equation has
 _TOGETHER = 4096  # poses whose bases are there at once, to bound memory
@@ -93,6 +94,26 @@ class Elimination:
         spread = np.empty(len(self.pose_of))
         spread[self._order] = self._all.spread(by_unknown, left[:, None])[:, 0]
         return spread
+
+    def seen_by(
+        self, by_unknown: FloatArray, some: BoolArray, left: FloatArray, least: int
+    ) -> tuple[IntArray, IntArray, FloatArray]:
+        """What some of the original equations (E,) alone tell of what is left (M, n).
+
+        Of poses with `least` equations left or more, which of them (B,), how many numbers each has
+        (B,) and these, one after another, (Σ, n): equally uncertain ones.
+        """
+        places, counts, parts = list[int](), list[int](), [np.empty((0, left.shape[1]))]
+        for equations, place, units, rest in self._bases(by_unknown):
+            if rest.shape[2] < least:
+                continue
+            for mine, at, unit, basis in zip(some[equations], place, units, rest, strict=True):
+                size, axes = np.linalg.svd(basis[mine], full_matrices=False)[1:]
+                told = axes[size > _TOLD]
+                places.append(int(unit))
+                counts.append(len(told))
+                parts.append(told @ left[at])
+        return np.array(places, np.intp), np.array(counts, np.intp), np.concatenate(parts)
 
     def _bases(self, by_unknown: FloatArray) -> Iterator[_Alike]:
         """Alike poses with equations left, lot by lot."""

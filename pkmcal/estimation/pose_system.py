@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray
+from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.estimation.elimination import Shares, System
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.prediction import Prediction
@@ -102,6 +102,14 @@ class PoseSystem:
         """As `Equations.by_groups`."""
         (_, by_unknown, _), group = self.at(evaluation, noise), self.blocks.group_of_equation
         return self.blocks.elimination.by_groups(by_unknown, group, weights, residual, leverage)
+
+    def closures_alone(
+        self, evaluation: Evaluation, noise: FloatArray, left: FloatArray, least: int
+    ) -> tuple[IntArray, IntArray, FloatArray]:
+        """What the closures alone tell of what is left (M, n): see `Elimination.seen_by`."""
+        _, by_unknown, _ = self.at(evaluation, noise)
+        closures = np.arange(len(by_unknown)) < int(self.blocks.counts.sum())
+        return self.blocks.elimination.seen_by(by_unknown, closures, left, least)
 
     def closure_residuals(
         self, evaluation: Evaluation, noise: FloatArray, weights: FloatArray, leverage: FloatArray

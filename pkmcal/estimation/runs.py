@@ -1,4 +1,4 @@
-"""Runs of relative distances: one of another file or session is another run, whatever its name."""
+"""Labels such as runs: one of another file or session is another, whatever its name."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from pathlib import PurePath
 import numpy as np
 
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.readings.distances import RelativeDistance
 
 Place = tuple[str, str]  # session and file of a row
 
@@ -17,7 +16,7 @@ Place = tuple[str, str]  # session and file of a row
 def runs_apart(
     sets: Sequence[Measurements], beside: Sequence[Measurements] = ()
 ) -> list[Measurements]:
-    """The sets, runs of one name renamed where they are of several files or sessions.
+    """Return the sets with runs of one name renamed where they are of several files or sessions.
 
     An instrument is set to zero anew in each: "1" becomes "monday.1" and "tuesday.1". `beside` are
     sets with other runs, which keep their names.
@@ -34,21 +33,21 @@ def runs_apart(
             for run, place in zip(runs, _places(measured), strict=True)
         ]
         if named != runs:
-            instrument = measured.instrument.with_fields({"run": np.array(named)})
-            measured = replace(measured, instrument=instrument)
+            instrument = measured.instrument
+            changed = instrument.with_fields({instrument.anew: np.array(named)})
+            measured = replace(measured, instrument=changed)
         found.append(measured)
     return found
 
 
 def _runs(measured: Measurements) -> list[str]:
-    """The run of each row; nothing of other readings."""
-    if not isinstance(measured.instrument, RelativeDistance):
-        return []
-    return [str(run) for run in np.asarray(measured.instrument.run).tolist()]
+    """Return the run of each row; nothing of readings without such a label."""
+    label = measured.instrument.anew
+    return np.asarray(getattr(measured.instrument, label)).astype(str).tolist() if label else []
 
 
 def _places(measured: Measurements) -> list[Place]:
-    """Session and file of each row of relative distances."""
+    """Return session and file of each row that has a run."""
     session = [""] * len(_runs(measured)) if measured.session is None else measured.session.tolist()
     return [(each, measured.file) for each in session[: len(_runs(measured))]]
 

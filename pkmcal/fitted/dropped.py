@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from pkmcal.arguments import did_you_mean, shown
-from pkmcal.arrays import BoolArray
+from pkmcal.arrays import BoolArray, IntArray
 from pkmcal.estimation.begin import estimator_at
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.estimate import Estimate
@@ -17,7 +17,7 @@ from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.pose_minima import solved_in_least_minima
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
-from pkmcal.fitted.outliers import outliers
+from pkmcal.fitted.outliers import LARGE, outliers
 
 Found = Literal["outliers", "slack"]
 Drop = Found | Sequence[int | Found] | None
@@ -96,7 +96,37 @@ def outlying(estimator: Estimator, estimate: Estimate) -> BoolArray:
         estimate.weights,
         estimate.prior @ estimate.half[:, :fitted],
     )
+    odd = np.union1d(odd, _elsewhere(estimator, estimate))
     return np.isin(equations.blocks.block_of_row, odd)
+
+
+def _elsewhere(estimator: Estimator, estimate: Estimate) -> IntArray:
+    """Poses at which much was read that agrees, but not with where the actuators say it is.
+
+    Of a picture, nearly all that is left says how good its corners are; the few numbers that say
+    where the machine was are compared by themselves.
+    """
+    equations, fitted = estimator.equations, estimate.state.fitted.rank
+    if equations.system is None or not (equations.blocks.components >= LARGE).any():
+        return np.empty(0, dtype=np.intp)
+    left = np.column_stack([estimate.residual, estimate.design[:, :fitted]])
+    blocks, counts, own = equations.system.closures_alone(
+        estimate.evaluation, estimate.state.noise, left, LARGE
+    )
+    weights = estimate.weights[blocks]
+    weighted = np.sqrt(np.repeat(weights, counts))[:, None] * own[:, 1:]
+    share, axes = np.linalg.eigh(np.eye(fitted) - weighted.T @ weighted)  # of all other equations
+    others = np.sqrt(np.maximum(share, 0.0))[:, None] * axes.T
+    odd = outliers(
+        own[:, 0],
+        own[:, 1:],
+        counts,
+        weights,
+        others,
+        stated=not equations.blocks.unstated[-1],
+    )
+    found: IntArray = blocks[odd]
+    return found
 
 
 def robust_outliers(

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, IntArray, largest_first, lots
+from pkmcal.arrays import BoolArray, FloatArray, IntArray, largest_first, lots
 from pkmcal.statistics.robust_scale import median_ratio
 
 _FALSE_ALARM = 0.01  # chance of naming any row at all where the noise is as stated
 _ALIKE = 1e-9  # share by which rows are further off than others that are not equally far off
+LARGE = 20  # components of a row that has an opinion of its own on how precise it is
+_FEW = 8  # such rows, from which on their scatter can be told
+_DEVIATION = 1.4826  # of a normal distribution in units of the median distance
+_TINY = 1e-6  # scatter that is none
 _NONE = np.finfo(float).tiny
 _MOST = 4  # at most one row in so many can be odd
 _TOGETHER = 4096  # rows that are looked at at once, to bound memory
@@ -23,6 +27,7 @@ def outliers(
     components: IntArray,
     weights: FloatArray,
     prior: FloatArray,
+    stated: bool = True,
 ) -> IntArray:
     """Rows further off than noise explains, by their residuals in a fit without them.
 
@@ -43,6 +48,9 @@ def outliers(
         Of each row in the fit.
     prior : ndarray (p, n)
         Derivative of the prior's equations, which stay.
+    stated : bool
+        Whether the noise is at least that by which rows are whitened; else outliers may have
+        been taken for noise.
 
     Returns
     -------
@@ -74,8 +82,10 @@ def outliers(
         for mine in alike:
             e = first[mine, None] + np.arange(components[mine[0]])
             squares[mine], own[mine] = _squares(left[e], jacobian[e], covariance, part[mine])
-        spread = median_ratio(squares[kept], components[kept])
-        chance = _chance(squares / max(spread, 1.0), components)
+        spread = max(median_ratio(squares[kept], components[kept]), 1.0 if stated else _NONE)
+        freedom = _freedom(squares, components, kept, LARGE if stated else 1)
+        scale = _median(freedom) / (_median(components) * spread)
+        chance = _chance(squares * scale, freedom)
         # where the chance is 0 to the last digit, the squares decide; they exceed its logarithm
         excess = np.where(chance > 0, -np.log(np.maximum(chance, _NONE)), squares)
         excess = np.where(kept, np.maximum(excess, 0.0), -1.0)
@@ -115,7 +125,32 @@ def _squares(
     return squares, 1.0 - values[:, 0]
 
 
-def _chance(squares: FloatArray, components: IntArray) -> FloatArray:
+def _median(freedom: FloatArray | IntArray) -> FloatArray:
+    """Of χ², nearly (E. B. Wilson and M. M. Hilferty, The distribution of chi-square, 1931)."""
+    given = np.asarray(freedom, dtype=np.float64)
+    median: FloatArray = given * (1.0 - 2.0 / (9.0 * given)) ** 3
+    return median
+
+
+def _freedom(squares: FloatArray, components: IntArray, kept: BoolArray, least: int) -> FloatArray:
+    """Degrees of freedom (N,) by how squares of rows of `least` components and more scatter.
+
+    Rows of many components, such as pictures, are seldom equally precise: where their mean squares
+    scatter more than chance lets them, one that is twice as large is no contradiction. As
+    F. E. Satterthwaite (Biometrics Bulletin 2 (1946) 110-114), from the median of what they are
+    off.
+    """
+    found = components.astype(np.float64)
+    large = components >= least
+    if np.count_nonzero(large & kept) >= _FEW:
+        mean = squares[large & kept] / components[large & kept]
+        off = np.abs(mean - np.median(mean))
+        scatter = float(_DEVIATION * np.median(off) / np.median(mean))
+        found[large] = np.minimum(found[large], max(2.0 / max(scatter, _TINY) ** 2, 1.0))
+    return found
+
+
+def _chance(squares: FloatArray, components: FloatArray) -> FloatArray:
     from scipy.special import gammaincc
 
     chance: FloatArray = gammaincc(components / 2, squares / 2)

@@ -31,6 +31,7 @@ from pkmcal.planning.planned import (
     equations_of,
     information,
     planned,
+    read_at,
     stated_loads,
     together,
     under,
@@ -279,6 +280,11 @@ def plan_poses(
     counts = _counts(kind, count, accuracy)
     kinds = list(counts)
     poses, q, inside, offered, unpulled = _within_limits(machine, candidates, loads)
+    mounted = not all(as_reading(each).placed for each in kinds)
+    able = read_at(machine, q, kinds)
+    if not able.any():
+        raise ArgumentError(f"candidates: at none of {len(q)} is all in the picture")
+    poses, q, inside = poses[able], q[able], inside[able]
     aims = (poses, q) if targets is None else _aims(machine, targets)
     distinct, place = np.unique(q, axis=0, return_inverse=True)
     stated = {each: _of("target", target, each, kinds) for each in kinds}
@@ -294,7 +300,7 @@ def plan_poses(
     rows = place.reshape(-1)[safe]
     blocks = together([information(each, len(distinct))[rows] for each in equations])
     sort = np.repeat(np.arange(len(kinds)), len(loads) * len(rows))
-    design, own_frame = design_of(parameters, blocks, sort, *aims, criterion, loads)
+    design, own_frame = design_of(parameters, blocks, sort, *aims, criterion, loads, mounted)
     poses, q, inside = poses[safe], q[safe], inside[safe]
     everything = design.predicted(np.arange(len(blocks)))
     if everything == 0.0 and (criterion == "prediction" or accuracy is not None):

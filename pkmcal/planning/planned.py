@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal.arguments import word, words
-from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.free_parameters import parameters
@@ -26,6 +26,7 @@ from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.tracker import Tracker
 from pkmcal.measurements.virtual_machine import VirtualMachine
 from pkmcal.planning.optimal_design import Criterion, Design
+from pkmcal.readings import orientation
 from pkmcal.readings.reading import Reading
 from pkmcal.readings.registry import Kind, as_reading
 from pkmcal.statistics.linear_fit import column_basis
@@ -33,6 +34,8 @@ from pkmcal.statistics.linear_fit import column_basis
 Unknown = Literal["frame", "target"]
 UNKNOWN: tuple[Unknown, ...] = ("frame", "target")
 
+_MANY = 12  # equations of a pose, such as a picture has
+_NOTHING = 1e-12  # share of what the most telling direction is told, that is rounding
 _UNIDENTIFIABLE = 1e-3  # mm a target moves per mm along an unidentifiable combination
 
 
@@ -64,7 +67,7 @@ def planned(
             f"kind: {instrument.noun()} state {needed[0]} for every row, and poses of a plan have"
             " none yet"
         )
-    rows = np.repeat(q, count, axis=0)
+    rows, instrument = instrument.of_poses(np.repeat(q, count, axis=0))
     if not instrument.components:
         if not surplus:
             raise ArgumentError(
@@ -89,8 +92,21 @@ def planned(
             index = np.tile(np.arange(count), len(q))
             measured = replace(measured, target=several, target_index=index)
     if actuator_noise is None:
-        return measured
+        if not instrument.tells_actuators:
+            return measured
+        actuator_noise = 0.0
     return replace(measured, actuator_sigma=np.asarray(actuator_noise, dtype=np.float64))
+
+
+def read_at(robot: Calibratable, q: FloatArray, kinds: Sequence[Kind | Reading]) -> BoolArray:
+    """Poses (N,) at which every instrument reads all that it has to."""
+    able = np.ones(len(q), dtype=bool)
+    for instrument in map(as_reading, kinds):
+        rows, own = instrument.of_poses(q)
+        if len(rows) > len(q):
+            seen = np.isfinite(VirtualMachine(robot, 0.0).measure(rows, own).values)
+            able &= seen.reshape(len(q), -1).all(axis=1)
+    return able
 
 
 def stated_loads(robot: Calibratable, payloads: Sequence[float | Load]) -> list[Load | None]:
@@ -160,9 +176,18 @@ def information(equations: Equations, poses: int) -> FloatArray:
     block_of_row = equations.blocks.block_of_row
     first = np.arange(0, len(block_of_row), len(block_of_row) // poses)
     if not equations.machines.unknowns:  # rows are blocks, in their order
-        return rows.reshape(poses, -1, rows.shape[1])
+        return compressed(rows.reshape(poses, -1, rows.shape[1]))
     units: FloatArray = rows.reshape(len(equations.blocks.components), -1, rows.shape[1])
     return units[block_of_row[first]]
+
+
+def compressed(blocks: FloatArray) -> FloatArray:
+    """Blocks (N, k, n) that say as much with fewer rows, where they have many."""
+    if blocks.shape[1] <= _MANY:
+        return blocks
+    _, size, axes = np.linalg.svd(blocks, full_matrices=False)
+    told = int((size > _NOTHING * size.max()).sum(axis=1).max(initial=1))
+    return np.asarray(size[:, :told, None] * axes[:, :told], dtype=np.float64)
 
 
 def together(parts: Sequence[FloatArray]) -> FloatArray:
@@ -180,8 +205,12 @@ def design_of(
     aims_at: FloatArray,
     criterion: Criterion,
     loads: Sequence[Load | None] = (None,),
+    mounted: bool = False,
 ) -> tuple[Design, bool]:
-    """The design, and whether its errors, under each load, are in the machine's own frame."""
+    """The design, and whether its errors, under each load, are in the machine's own frame.
+
+    `mounted`: what is on the platform has to be found, so that its frame is the machine's own, too.
+    """
     k = len(chosen.places)
     machines = [under(chosen.robot, load) for load in loads]
     twists = np.concatenate([machine.error_twists(aims, aims_at) for machine in machines])
@@ -201,7 +230,11 @@ def design_of(
     moved = aimed.reshape(-1, len(chosen)) @ made.unidentifiable
     if np.abs(moved).max(initial=0.0) <= _UNIDENTIFIABLE:
         return made, False
-    rigid = column_basis(_rigid_motions(aims[:, :3]))
+    motions = _rigid_motions(aims[:, :3])
+    if mounted:  # points of the platform, as far from its origin everywhere
+        turned = orientation.rotations(aims[:, 3:]).reshape(-1, 3)
+        motions = np.hstack([motions, turned])
+    rigid = column_basis(motions)
     within = rigid.T @ moved
     if np.abs(moved - rigid @ within).max() <= _UNIDENTIFIABLE * np.abs(moved).max():
         ways, sizes, _ = np.linalg.svd(within)

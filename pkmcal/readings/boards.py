@@ -10,17 +10,18 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pkmcal.arguments import number, shown
+from pkmcal.arguments import flag, number, shown
 from pkmcal.arrays import FloatArray, Int64Array
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.csv_table import Table
 from pkmcal.readings import rows
 
-Print = Literal["chessboard", "charuco", "apriltags", "points"]
+Print = Literal["chessboard", "charuco", "apriltags", "circles", "points"]
 _FORMS = (
     "chessboard:COLUMNSxROWS,SQUARE of inner corners",
-    "charuco:COLUMNSxROWS,SQUARE,MARKER,DICTIONARY of squares",
+    "charuco:COLUMNSxROWS,SQUARE,MARKER,DICTIONARY[,legacy] of squares",
     "apriltags:COLUMNSxROWS,TAG,GAP,FAMILY of tags",
+    "circles:COLUMNSxROWS,PITCH of dots",
 )
 
 
@@ -28,22 +29,26 @@ _FORMS = (
 class Board:
     """A board with corners that a camera sees, in axes of the board: x right, y down as printed.
 
-    Made by `chessboard`, `charuco`, `apriltags`, `points`, or by `parse` from a word.
+    Made by `chessboard`, `charuco`, `apriltags`, `circles`, `points`, or by `parse` from a word.
 
     Attributes
     ----------
     kind : str
-        What is printed: "chessboard", "charuco", "apriltags" or "points".
+        What is printed: "chessboard", "charuco", "apriltags", "circles" or "points".
     ids : ndarray of int (n,)
         The number of each corner, as detectors count them.
     places : ndarray (n, 3)
         Where it is, mm.
     shape : (int, int)
-        Columns and rows: inner corners of a chessboard, squares of a ChArUco board, tags.
+        Columns and rows: inner corners of a chessboard, squares of a ChArUco board, tags, dots.
     sizes : tuple of float
-        Of a square; of a square and a marker; of a tag and the gap between two; mm.
+        Of a square; of a square and a marker; of a tag and the gap between two; from dot to dot;
+        mm.
     dictionary : str
         The markers': "5X5_100", "APRILTAG_36h11" …
+    legacy : bool
+        Of a ChArUco board, whether it is of OpenCV before 4.6, where an even number of rows begins
+        with a marker.
 
     Examples
     --------
@@ -59,6 +64,7 @@ class Board:
     shape: tuple[int, int] = (0, 0)
     sizes: tuple[float, ...] = ()
     dictionary: str = ""
+    legacy: bool = False
 
     @staticmethod
     def chessboard(columns: int, rows: int, square: float) -> Board:
@@ -68,7 +74,7 @@ class Board:
         ----------
         columns, rows : int
             How many inner corners there are along and down. One odd and one even number, or the
-            board looks alike when it is turned by 180°.
+            board looks alike when it is turned by 180°. The square at the first corner is black.
         square : float
             Side of a square, mm.
         """
@@ -76,7 +82,14 @@ class Board:
         return _board("chessboard", _grid(*shape) * square, shape, sizes)
 
     @staticmethod
-    def charuco(columns: int, rows: int, square: float, marker: float, dictionary: str) -> Board:
+    def charuco(
+        columns: int,
+        rows: int,
+        square: float,
+        marker: float,
+        dictionary: str,
+        legacy: bool = False,
+    ) -> Board:
         """Corners between the squares of a ChArUco board, counted as OpenCV does.
 
         Parameters
@@ -87,12 +100,14 @@ class Board:
             Sides of a square and of the marker in it, mm.
         dictionary : str
             Of the markers, as ``5X5_100``.
+        legacy : bool
+            Whether it was printed by OpenCV before 4.6.
         """
         shape, sizes = _shape(columns, rows, 3), _sizes(square=square, marker=marker)
         if marker >= square:
             raise ArgumentError(f"marker must be smaller than the square of {square:g} mm")
         places = (_grid(columns - 1, rows - 1) + np.array([1.0, 1.0, 0.0])) * square
-        return _board("charuco", places, shape, sizes, dictionary)
+        return _board("charuco", places, shape, sizes, dictionary, flag("legacy", legacy))
 
     @staticmethod
     def apriltags(
@@ -113,6 +128,20 @@ class Board:
         own = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]) * tag
         places = (_grid(*shape)[:, None, :] * (tag + gap) + own).reshape(-1, 3)
         return _board("apriltags", places, shape, sizes, family)
+
+    @staticmethod
+    def circles(columns: int, rows: int, pitch: float) -> Board:
+        """Dots row by row; one at the lower left that is larger tells how the board is turned.
+
+        Parameters
+        ----------
+        columns, rows : int
+            How many dots there are along and down.
+        pitch : float
+            From dot to dot, mm.
+        """
+        shape, sizes = _shape(columns, rows, 2), _sizes(pitch=pitch)
+        return _board("circles", _grid(*shape) * pitch, shape, sizes)
 
     @staticmethod
     def points(ids: Sequence[int], places: ArrayLike) -> Board:
@@ -143,7 +172,8 @@ class Board:
         ----------
         word : str or path
             ``chessboard:10x7,20``, ``charuco:8x6,20,15,5X5_100``,
-            ``apriltags:6x4,30,9,APRILTAG_36h11``, or the path of a file that ends in ``.csv``.
+            ``apriltags:6x4,30,9,APRILTAG_36h11``, ``circles:10x7,25``, or the path of a file that
+            ends in ``.csv``.
 
         Raises
         ------
@@ -159,18 +189,21 @@ class Board:
         size, *others = rest.split(",")
         try:
             columns, rows_ = (int(each) for each in size.lower().split("x"))
-            if kind == "chessboard":
-                (square,) = (float(each) for each in others)
-                return Board.chessboard(columns, rows_, square)
-            first, second, dictionary = others
+            if kind in ("chessboard", "circles"):
+                (pitch,) = (float(each) for each in others)
+                make = Board.chessboard if kind == "chessboard" else Board.circles
+                return make(columns, rows_, pitch)
+            legacy = kind == "charuco" and others[3:] == ["legacy"]
+            first, second, dictionary = others[:3] if legacy else others
             lengths = float(first), float(second)
             if kind not in ("charuco", "apriltags"):
                 raise ValueError(kind)
         except ValueError:
             forms = "; ".join(_FORMS)
             raise ArgumentError(f"board: expected {forms}, in mm; found {shown(word)}") from None
-        make = Board.charuco if kind == "charuco" else Board.apriltags
-        return make(columns, rows_, *lengths, dictionary)
+        if kind == "charuco":
+            return Board.charuco(columns, rows_, *lengths, dictionary, legacy)
+        return Board.apriltags(columns, rows_, *lengths, dictionary)
 
     def at(self, ids: ArrayLike) -> FloatArray:
         """Places (N, 3), mm, of corners by their numbers (N,).
@@ -200,8 +233,9 @@ def _board(
     shape: tuple[int, int],
     sizes: tuple[float, ...],
     dictionary: str = "",
+    legacy: bool = False,
 ) -> Board:
-    return Board(kind, np.arange(len(places)), places, shape, sizes, dictionary)
+    return Board(kind, np.arange(len(places)), places, shape, sizes, dictionary, legacy)
 
 
 def _grid(columns: int, rows_: int) -> FloatArray:

@@ -24,13 +24,15 @@ from pkmcal.arrays import FloatArray, IntArray, as_rows
 from pkmcal.core import instruments, screws
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.csv_table import Table
-from pkmcal.readings import orientation, rows
+from pkmcal.readings import rows, twists
 from pkmcal.readings.board_poses import board_poses, unbent
 from pkmcal.readings.boards import Board
+from pkmcal.readings.lens_doubts import lens_doubts
 from pkmcal.readings.lens_files import read_lens
 from pkmcal.readings.measured import InFit, Measured
 from pkmcal.readings.reading import At, Predicted, Reading, Sets, Solve
 from pkmcal.readings.seen_places import in_agreement
+from pkmcal.readings.sight import visible
 from pkmcal.readings.unknowns import PLACE, Dependence, Numbers, Start, always
 from pkmcal.readings.unknowns import Found as Starts
 
@@ -69,7 +71,8 @@ class Camera(Reading):
     k1, k2, p1, p2, k3 : float
         Distortion, as OpenCV has it.
     width, height : int
-        Of the pictures, px; 0: not known. A simulated camera sees nothing beyond them.
+        Of the pictures, px; 0: not known. A simulated camera sees nothing beyond them, nothing of a
+        board that it sees at more than 60° or from behind.
     lens : {"none", "focal", "all"}
         What of the lens is to be found beside the machine, from these values on: "focal" is fx fy
         cx cy, "all" k1 k2 p1 p2 as well: ``lens.fx`` …. State a prior where it is known roughly.
@@ -85,7 +88,10 @@ class Camera(Reading):
     >>> robot = pk.load("hexapod")
     >>> board = pk.readings.Board.chessboard(5, 4, square=30)
     >>> stands = [0, 0, 2500, np.pi, 0, 0]  # it looks down
-    >>> camera = pk.readings.Camera(fx=3000, fy=3000, cx=1200, cy=1000, stands=stands)
+    >>> carried = [0, 0, 0, np.pi, 0, 0]  # the board looks up
+    >>> camera = pk.readings.Camera(
+    ...     fx=3000, fy=3000, cx=1200, cy=1000, stands=stands, carried=carried
+    ... )
     >>> q, seeing = camera.seeing(robot.inverse([[0, 0, 850, 0, 0, 0]]), board)
     >>> pk.VirtualMachine(robot, 0.0).measure(q, seeing).values[0].round(3)
     array([1200., 1000.])
@@ -153,6 +159,13 @@ class Camera(Reading):
         corner = np.tile(board.places, (len(pictures), 1))
         return np.repeat(pictures, count, axis=0), self.with_fields({"corner": corner})
 
+    def of_poses(self, q: FloatArray) -> tuple[FloatArray, Camera]:
+        """A picture at each: rows of all corners of its board, where they are not stated."""
+        if self.board is None or self.corner is not None:
+            return q, self
+        rows_, seeing = self.seeing(q, self.board)
+        return rows_, seeing.with_fields({"board": None})
+
     # the model ------------------------------------------------------------------------------------
 
     def predict(
@@ -176,22 +189,22 @@ class Camera(Reading):
         board, to_board = to_mounting @ within, None
         if self.on == "platform":
             board = np.linalg.inv(board)
-            to_board = -_adjoint(board)
+            to_board = -twists.adjoint(board)
         seen, by_twist, by_lens, by_size, depth = instruments.pixels(
             screws.pose(np.ascontiguousarray(board).reshape(-1, 16)),
             self._corners(len(at.pose)) if corner is None else corner,
-            self._lens() if lens is None else lens,
+            self.lens_numbers() if lens is None else lens,
             size,
         )
         seen[~(depth > 0)] = np.nan
         by = by_twist if to_board is None else by_twist @ to_board
         by_frame = None
         if at.frame is not None:
-            by_frame = by @ _adjoint(outer[None]) @ _twists_of_numbers(at.frame[None])
-        of_tool = _adjoint(to_mounting) @ _twists_of_numbers(tool.reshape(-1, 6))
+            by_frame = by @ twists.adjoint(outer[None]) @ twists.twists_of_numbers(at.frame[None])
+        of_tool = twists.adjoint(to_mounting) @ twists.twists_of_numbers(tool.reshape(-1, 6))
         return Predicted(
             seen,
-            by @ (_adjoint(base[None]) @ _at_base(at.pose)),
+            by @ (twists.adjoint(base[None]) @ twists.at_base(at.pose)),
             {"tool": by @ of_tool, "lens": by_lens, "size": by_size[:, :, None]},
             by_frame=by_frame,
         )
@@ -202,7 +215,7 @@ class Camera(Reading):
         count, every = len(m), np.zeros(len(m), dtype=np.intp)
         yield always("tool", "tool", PLACE, [self._carried_thing] * count, data.starts)
         yield Dependence("corner", "corner", self._corners(count), {}, every)
-        lens = np.tile(self._lens(), (count, 1))
+        lens = np.tile(self.lens_numbers(), (count, 1))
         slots = _FOUND[self.lens]
         found = {"": self._lens_numbers(m, slots)} if slots else {}
         yield Dependence("lens", "lens", lens, found, every)
@@ -227,35 +240,56 @@ class Camera(Reading):
         the machine's poses (N, 6) agree; NaN in all other rows.
         """
         found = np.full((len(m), 6), np.nan)
-        picture = self._pictures(m)
-        corner = self._corners(len(m))
+        used, number = self._pictures_told(m)
+        if not len(used):
+            return found
+        first = np.unique(number, return_index=True)[1]
+        boards = board_poses(
+            self._corners(len(m))[used], m.values[used], self.lens_numbers(), number
+        )
+        seen = boards.pose
+        if self.on == "platform":
+            seen = twists.inverse(seen.reshape(-1, 6)).reshape(seen.shape)
+        found[used[first]] = in_agreement(seen, pose[used[first]])
+        return found
+
+    def doubts(self, m: Measured) -> Iterator[str]:
+        """Lenses of turned or rectified pictures, mirrored pictures."""
+        used, number = self._pictures_told(m)
+        if not len(used) or self.lens != "none":
+            return iter(())
+        corner, size = self._corners(len(m))[used], (self.width, self.height)
+        return lens_doubts(corner, m.values[used], self.lens_numbers(), number, size)
+
+    def _pictures_told(self, m: Measured) -> tuple[IntArray, IntArray]:
+        """Rows (n,) of pictures that tell where a board is, and which picture each is of (n,)."""
+        picture, corner = self._pictures(m), self._corners(len(m))
         known = np.isfinite(m.values).all(axis=1)
         flat = np.linalg.svd(corner - corner.mean(axis=0), compute_uv=False)
         fewest = _FEWEST if flat[-1] <= 1e-6 * flat[0] else 6
         enough = np.bincount(picture[known], minlength=int(picture.max()) + 1) >= fewest
         used = np.flatnonzero(known & enough[picture])
-        if not len(used):
-            return found
-        _, first, number = np.unique(picture[used], return_index=True, return_inverse=True)
-        boards = board_poses(corner[used], m.values[used], self._lens(), number.reshape(-1))
-        seen = boards.pose
-        if self.on == "platform":
-            seen = _inverse(seen.reshape(-1, 6)).reshape(seen.shape)
-        found[used[first]] = in_agreement(seen, pose[used[first]])
-        return found
+        return used, np.unique(picture[used], return_inverse=True)[1].reshape(-1)
 
     def arguments(self, m: Measured) -> dict[str, FloatArray]:
         """What is mounted where, as a simulation was told."""
         return {"tool": as_rows("carried", self.carried, 6)[0][0]}
 
     def simulated(self, m: Measured, solve: Solve) -> FloatArray:
-        """NaN of corners that are behind the camera or beyond its picture."""
+        """NaN of corners that the camera does not see: see `sight.visible`."""
         stands = as_rows("stands", self.stands, 6)[0][0]
         at = At(solve(m.actuators, "q").pose, frame=stands)
         seen = self.predict(at, **self.arguments(m)).values
-        for k, end in enumerate((self.width, self.height)):
-            if end:
-                seen[~((seen[:, k] >= 0) & (seen[:, k] <= end - 1))] = np.nan
+        base, moved, mounted = (
+            screws.frames(stands[None]),
+            screws.frames(at.pose),
+            self.arguments(m),
+        )
+        board = base @ moved @ screws.frames(mounted["tool"][None])
+        if self.on == "platform":
+            board = np.asarray(np.linalg.inv(board), dtype=np.float64)
+        size = (self.width, self.height)
+        seen[~visible(board, self._corners(len(m)), seen, self.lens_numbers(), size)] = np.nan
         return seen
 
     # units ----------------------------------------------------------------------------------------
@@ -287,7 +321,7 @@ class Camera(Reading):
                 "corner: pixels need the corner that each row shows: its place on the board, as"
                 " Board.at has it"
             )
-        numbers = rows.numbers("lens", self._lens())
+        numbers = rows.numbers("lens", self.lens_numbers())
         if not (numbers[:2] > 0).all():
             raise ArgumentError(
                 f"fx and fy must be above 0 px; found {numbers[0]:g} and {numbers[1]:g}: read the"
@@ -305,12 +339,13 @@ class Camera(Reading):
     def _corners(self, count: int) -> FloatArray:
         return np.array(np.broadcast_to(np.asarray(self.corner, dtype=np.float64), (count, 3)))
 
-    def _lens(self) -> FloatArray:
+    def lens_numbers(self) -> FloatArray:
+        """The nine numbers (9,), in the order of `LENS`."""
         return np.array([getattr(self, name) for name in LENS], dtype=np.float64)
 
     def _lens_numbers(self, m: Measured, slots: tuple[int, ...]) -> Numbers:
         """Numbers of the lens that are found, counted by how much they move what is seen."""
-        lens = np.tile(self._lens(), (len(m), 1))
+        lens = np.tile(self.lens_numbers(), (len(m), 1))
         known = np.isfinite(m.values).all(axis=1)
         rate = np.ones(9)
         if known.any():
@@ -323,7 +358,7 @@ class Camera(Reading):
             tuple(f"lens.{LENS[slot]}" for slot in slots),
             tuple(_UNITS[slot] for slot in slots),
             np.array(chosen, dtype=np.intp),
-            self._lens()[chosen],
+            self.lens_numbers()[chosen],
             pixel / np.maximum(rate, _LEAST)[chosen],
         )
 
@@ -354,47 +389,6 @@ class Camera(Reading):
             )
         places = self.board.at(table.integers("corner"))
         return self.with_fields({"corner": places, "board": None})
-
-
-def _adjoint(motion: FloatArray) -> FloatArray:
-    """Of motions (N, 4, 4), (N, 6, 6)."""
-    flat = np.ascontiguousarray(motion).reshape(-1, 16)
-    matrices: FloatArray = screws.adjoint(flat).reshape(-1, 6, 6)
-    return matrices
-
-
-def _inverse(pose: FloatArray) -> FloatArray:
-    """Inverse poses (N, 6); NaN of NaN."""
-    found = np.full_like(pose, np.nan)
-    known = np.isfinite(pose).all(axis=1)
-    motion = np.linalg.inv(screws.frames(pose[known]))
-    found[known] = screws.pose(np.ascontiguousarray(motion).reshape(-1, 16))
-    return found
-
-
-def _at_base(pose: FloatArray) -> FloatArray:
-    """Twists at the base's origin (N, 6, 6) by those at the platform's, which is at (N, 6)."""
-    found = np.tile(np.eye(6), (len(pose), 1, 1))
-    found[:, 3:, :3] = _crossed(pose[:, :3])
-    return found
-
-
-def _twists_of_numbers(pose: FloatArray) -> FloatArray:
-    """Twists (N, 6, 6) about the origin by the numbers x y z α β γ of poses (N, 6)."""
-    found = np.zeros((len(pose), 6, 6))
-    axes = orientation.axes_of_angles(pose[:, 3:])
-    found[:, :3, 3:] = axes
-    found[:, 3:, :3] = np.eye(3)
-    found[:, 3:, 3:] = _crossed(pose[:, :3]) @ axes
-    return found
-
-
-def _crossed(place: FloatArray) -> FloatArray:
-    """Matrices (N, 3, 3) of cross products with places (N, 3)."""
-    found = np.zeros((len(place), 3, 3))
-    for i in range(3):
-        found[:, :, i] = np.cross(place, np.eye(3)[i])
-    return found
 
 
 def _mm_per_pixel(corner: FloatArray, pixel: FloatArray) -> float:

@@ -93,6 +93,7 @@ class RelativeDistance(Distance):
     starts_by_pose = True
     planned = False
     labels = ("run",)
+    anew = "run"
 
     def dependences(self, data: InFit) -> Iterator[Dependence]:
         """Both ends, and the zero of each run."""

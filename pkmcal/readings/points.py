@@ -63,6 +63,7 @@ class Height(Position):
     frame_order = 2
     is_place = False
     by_firmware = True
+    more = "probe 20 points or more"
 
     def predict(self, at: At, target: FloatArray = ORIGIN, **numbers: FloatArray) -> Predicted:
         """Height of the point `target` (N, 3) of the platform, mm."""

@@ -171,6 +171,13 @@ class Reading:
         Which body `Measurements.target` is a point of: the "platform", the "base", or "", neither.
     nouns : (str, str) or None
         What one and several are called, where not as the kind and with an s.
+    shrinks : bool
+        Whether misfits fall where the machine gets smaller: readings that tell no length but have
+        one.
+    more : str
+        The advice where there are too few of them.
+    argument : str
+        The argument that states them, where they are no measurements of their own.
     by_firmware : bool
         Whether a firmware's own numbers may be mistaken for these readings.
     planned : bool
@@ -181,6 +188,8 @@ class Reading:
         Fields with an entry for every row.
     labels : tuple of str
         Fields that name something for every row, each with a column of its own; they are needed.
+    anew : str
+        The label that names another thing in another file or session, whatever its name.
     own_points : tuple of str
         Fields that are points, as `Measurements.target` is: (3,), (N, 3), or (k, 3) one for each of
         several targets. Their columns are ``NAME.x``, ``.y`` and ``.z``.
@@ -201,11 +210,15 @@ class Reading:
     is_place: ClassVar[bool] = False
     point: ClassVar[Literal["platform", "base", ""]] = ""
     nouns: ClassVar[tuple[str, str] | None] = None
+    shrinks: ClassVar[bool] = False
+    more: ClassVar[str] = "measure more poses"
+    argument: ClassVar[str] = ""
     by_firmware: ClassVar[bool] = False
     planned: ClassVar[bool] = True
     starts_by_pose: ClassVar[bool] = False
     per_row: ClassVar[tuple[str, ...]] = ()
     labels: ClassVar[tuple[str, ...]] = ()
+    anew: ClassVar[str] = ""
     own_points: ClassVar[tuple[str, ...]] = ()
     truth: ClassVar[tuple[str, ...]] = ()
     stated: ClassVar[tuple[str, ...]] = ()
@@ -257,10 +270,21 @@ class Reading:
         """Give the arguments of `predict` for an instrument whose truth is stated."""
         return {}
 
+    def of_poses(self: Own, q: FloatArray) -> tuple[FloatArray, Own]:
+        """Actuators of the rows, pose by pose, that it reads at each of (N, n); and it, of these.
+
+        By default one row at each.
+        """
+        return q, self
+
     def simulated(self, m: Measured, solve: Solve) -> FloatArray:
         """Compute what the instrument would read without noise, (N, k)."""
         at = At(solve(m.actuators, "q").pose, axis=np.full(len(m), 2))
         return self.predict(at, **self.arguments(m)).values
+
+    def doubts(self, m: Measured) -> Iterator[str]:
+        """Say what the readings themselves show to be wrong with them, a sentence each."""
+        return iter(())
 
     # differences ----------------------------------------------------------------------------------
 

@@ -69,6 +69,7 @@ class Touch(Reading):
     places: Mapping[str, ArrayLike] | None = None
 
     name = "touch"
+    shrinks = True
     point = "platform"
     nouns = ("touch", "touches")
     starts_by_pose = True
@@ -208,6 +209,7 @@ class TouchDistance(Reading):
     distances: TouchDistances = ()
 
     name = "touch-distance"
+    argument = "touch_distances"
     stated = ("distances",)
     planned = False
     components = DISTANCE

@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import least_squares
 
 import pkmcal as pk
-from pkmcal.cli.geometry_options import read_prior
+from pkmcal.jobs.geometry_options import read_prior
 
 ANCHORS = np.array([[0.0, 0], [3000, 0], [0, 2000], [3000, 2000]])
 FREE = ("base2.x", "base3.x", "base3.y", "base4.x", "base4.y", "gain1", "gain2", "gain3", "gain4")

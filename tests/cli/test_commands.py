@@ -24,9 +24,10 @@ from pkmcal.calibration.identification import Identification
 from pkmcal.calibration.identify import identify
 from pkmcal.cli import verbs
 from pkmcal.cli.demonstration import demonstrate
-from pkmcal.cli.geometry_options import read_deviations
 from pkmcal.cli.main import main
 from pkmcal.files import atomic as whole_file
+from pkmcal.jobs import calibrating, read_files
+from pkmcal.jobs.geometry_options import read_deviations
 from pkmcal.measurements.measurements import Measurements
 
 from ..simulated import altered
@@ -242,7 +243,7 @@ def test_result_that_did_not_converge_is_not_to_be_trusted(
     def gave_up(*arguments: Any, **settings: Any) -> Identification:
         return altered(identify(*arguments, **settings), converged=False)
 
-    monkeypatch.setattr(pk, "identify", gave_up)
+    monkeypatch.setattr(calibrating, "identify", gave_up)
     result = run("calibrate", ROBOT, PROBE)
     assert result.exit_code == 1
     assert result.stdout.startswith("Not calibrated: the least squares did not converge\n")
@@ -358,7 +359,7 @@ def test_mistake_of_the_program_is_not_taken_for_wrong_input(
     def broken(*arguments: Any, **options: Any) -> None:
         raise ZeroDivisionError
 
-    monkeypatch.setattr(pk, "read_measurements", broken)
+    monkeypatch.setattr(read_files, "read_measurements", broken)
     result = run("calibrate", ROBOT, PROBE)
     assert result.exit_code == 3 and "ZeroDivisionError" in result.stderr
 
@@ -369,7 +370,7 @@ def test_ctrl_c_ends_the_command_without_a_traceback(
     def stopped(*arguments: Any, **options: Any) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(pk, "read_measurements", stopped)
+    monkeypatch.setattr(read_files, "read_measurements", stopped)
     result = run("calibrate", ROBOT, PROBE)
     assert result.exit_code == 130
     assert "Traceback" not in result.output

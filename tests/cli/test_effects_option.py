@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import pkmcal as pk
-from pkmcal.cli.effects_option import read_effects
+from pkmcal.jobs.effects_option import read_effects
 
 
 @pytest.mark.parametrize(

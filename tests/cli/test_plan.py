@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal.cli.calibrate import read_tracker
+from pkmcal.jobs.calibrating import read_tracker
 from pkmcal.measurements.command_csv import read_commands
 from pkmcal.measurements.pose_csv import read_poses
 

@@ -15,8 +15,8 @@ import pytest
 
 import pkmcal as pk
 from pkmcal.cli import tolerance as cli_tolerance
-from pkmcal.cli.geometry_options import read_deviations
 from pkmcal.error_model.sensitivity import STUDIES, own_names, study_cases
+from pkmcal.jobs.geometry_options import read_deviations
 from pkmcal.measurements.pose_csv import read_poses, write_poses
 from pkmcal.report import drawing
 from pkmcal.report import error_figures as figures

@@ -33,7 +33,7 @@ def test_every_folder_of_real_measurements_has_a_notebook() -> None:
     if not DATA.exists():
         pytest.skip("the measurements are not beside this checkout (../shared/data)")
     folders = {path.parent for path in DATA.rglob("*") if path.suffix in (".csv", ".json")}
-    folders.discard(DATA / "charuco")  # pictures of a camera, which is no instrument yet
+    folders.discard(DATA / "charuco")  # pictures of a camera and no machine: poses of a flange
     assert folders == {file.parent for script in SCRIPTS for file in data_of(script)}
 
 

@@ -102,3 +102,17 @@ def test_a_folder_of_corners_and_a_log_are_calibrated_in_one_command(
     assert "--board BOARD" in refused("calibrate", *files, *lens)
     assert "--camera FILE" in refused("calibrate", *files, "--board", BOARD)
     assert "chessboard:" in refused("calibrate", *files, *lens, "--board", "charuco:5x7")
+
+
+def test_the_board_is_found_in_15_of_16_pictures(flange: Path) -> None:
+    """Corners are those of the file, which holds what OpenCV found without refining it again."""
+    pytest.importorskip("cv2", reason="OpenCV is not installed (the extra vision)")
+    found = pk.detect(DATA / "images", Board.parse(BOARD), Camera.from_file(DATA / "lens.yaml"))
+    assert len(found.taken) == 15 and len(found.corner) == 290
+    assert dict(found.bad) == {"2.png": "4 corners, 6 are needed"}
+    table = np.genfromtxt(DATA / "pixels.csv", delimiter=",", skip_header=1, dtype=str)
+    there = {(name, int(i)): (float(u), float(v)) for name, i, u, v in table}
+    names = [found.taken[i].path.name for i in found.image]
+    other = np.array([there[each] for each in zip(names, found.corner.tolist(), strict=True)])
+    assert np.abs(np.median(found.pixel - other, axis=0)).max() < 0.05
+    assert np.median(np.linalg.norm(found.pixel - other, axis=1)) < 0.3

@@ -11,6 +11,7 @@ from pkmcal.files.units import UNITS
 from pkmcal.geometry.stated_uncertainty import COMMON, CONSIDER, unit_of
 from pkmcal.kinematics.calibratable import Calibratable
 
+DEFAULT = "default"  # stands for the numbers that the robot file frees
 _PAIR = re.compile(r"(?P<name>[^=]+)=\s*(?P<value>[^=±]*?)\s*(?:±|\+-)\s*(?P<sigma>.*)")
 _DEVIATION = re.compile(
     r"(?:(?P<name>[^=]+)=)?\s*"
@@ -19,14 +20,20 @@ _DEVIATION = re.compile(
 
 
 def free_names(robot: Calibratable, given: Sequence[str] | None) -> list[str]:
-    """Names that ``--free`` chooses, or the robot's default set.
+    """Names that ``--free`` chooses; the robot's default set without it, and for the word default.
 
     Raises
     ------
     ValueError
         A name that the robot does not have, or that a parameter drives.
     """
-    return matching("--free", robot, given) if given else list(robot.model.free)
+    default = list(robot.model.free)
+    if not given:
+        return default
+    names = [name.strip() for text in given for name in text.split(",")]
+    others = [name for name in names if name != DEFAULT]
+    chosen = matching("--free", robot, others) if others else []
+    return list(dict.fromkeys([*default, *chosen])) if DEFAULT in names else chosen
 
 
 def matching(option: str, robot: Calibratable, given: Sequence[str]) -> list[str]:

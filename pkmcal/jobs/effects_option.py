@@ -14,13 +14,6 @@ from pkmcal.files.number_text import typed
 
 OPTION = "--effects"
 AUTO = "auto"
-HELP = (
-    "What arms do beside their geometry: sag, the joints that gravity turns most; sag=all,"
-    " sag=2:3:5, sag=tied by known masses; harmonics=1:2 waves a turn, harmonics=200@3 of joint 3;"
-    " coupling=5.4, joint 5 turned by 4; backlash; auto: what helps at poses left out; none."
-    " Of other machines elasticity=offset*, compliances of legs and screws, by loads of the rows."
-    " Separate several with commas."
-)
 
 
 def read_effects(given: Sequence[str]) -> list[Any] | Literal["auto"]:

@@ -1,0 +1,245 @@
+"""Runs a `Calibration`: reads its files and makes the arguments of `identify` of its options."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from pkmcal.arguments import word
+from pkmcal.arms.arm import SerialArm
+from pkmcal.calibration.asked import Role
+from pkmcal.calibration.identification import Identification
+from pkmcal.calibration.identify import identify
+from pkmcal.effects.expansion import Expansion
+from pkmcal.estimation.loss import LIMITS
+from pkmcal.estimation.parameters import KNOWN, Known
+from pkmcal.exceptions import ArgumentError, CalibrationWarning
+from pkmcal.files.number_text import typed
+from pkmcal.fitted.dropped import Found
+from pkmcal.jobs.calibration import Calibration
+from pkmcal.jobs.effects_option import AUTO, OPTION, read_effects
+from pkmcal.jobs.geometry_options import (
+    free_names,
+    matching,
+    read_coefficients,
+    read_prior,
+    read_uncertainty,
+)
+from pkmcal.jobs.inputs import Inputs
+from pkmcal.jobs.read_files import read_file, rows_to_drop, without_lines
+from pkmcal.jobs.sessions import in_sessions
+from pkmcal.kinematics.calibratable import Calibratable, as_machine
+from pkmcal.kinematics.robot import Robot
+from pkmcal.loading import load
+from pkmcal.measurements.measurements import Measurements
+from pkmcal.measurements.tracker import Tracker
+from pkmcal.readings.unknowns import POINT
+from pkmcal.statistics.covariance import RULES
+
+Tell = Callable[[str], object]  # takes a line on what was assumed
+
+
+@dataclass(frozen=True)
+class Sources:
+    """What was read of a calibration.
+
+    Attributes
+    ----------
+    robot : Robot or SerialArm
+        The machine.
+    measured : tuple of Measurements
+        Those of each file.
+    held : Measurements or None
+        Those of a file that is held out.
+    doubts : tuple of str
+        Warnings of reading.
+    """
+
+    robot: Robot | SerialArm
+    measured: tuple[Measurements, ...]
+    held: Measurements | None
+    doubts: tuple[str, ...]
+
+
+def run(job: Calibration, inputs: Inputs, tell: Tell) -> Identification:
+    """Read the files of a calibration and identify the machine.
+
+    Parameters
+    ----------
+    job : Calibration
+        What is asked for.
+    inputs : Inputs
+        Reads the files, each once.
+    tell : callable
+        Takes each line on what was assumed in reading.
+    """
+    sources = read(job, inputs, tell)
+    return identified(sources, arguments(job, sources, tell))
+
+
+def read(job: Calibration, inputs: Inputs, tell: Tell) -> Sources:
+    """Read machine and measurements: what does not change while only options of the fit do."""
+    robot: Robot | SerialArm = load(inputs.robot(job.robot))
+    machine = as_machine(robot)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", CalibrationWarning)
+        measured = [read_file(path, machine, job.reading, inputs, tell) for path in job.files]
+    doubts = tuple(str(each.message) for each in caught)
+    for doubt in doubts:
+        tell(doubt)
+    held = None
+    if job.held_file is not None:
+        held = read_file(job.held_file, machine, job.reading, inputs, tell)
+    return Sources(robot, tuple(measured), held, doubts)
+
+
+def identified(sources: Sources, arguments: dict[str, Any]) -> Identification:
+    """Identify; what `identify` warns of is in the summary."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        return identify(sources.robot, **arguments)
+
+
+def arguments(job: Calibration, sources: Sources, tell: Tell) -> dict[str, Any]:
+    """Arguments of `identify` beside the machine.
+
+    Raises
+    ------
+    ValueError
+        An option that says nothing of this machine, or of these measurements.
+    """
+    machine = as_machine(sources.robot)
+    measured, held, dropped = _rows(job, sources, tell)
+    words = {
+        "loss": word("--loss", job.loss, LIMITS),
+        "rule": word("--covariance", job.covariance, RULES),
+    }
+    free, fixed = _free(job, machine)
+    return {
+        "measurements": measured[0] if len(measured) == 1 else measured,
+        "free": free,
+        "prior": read_prior(job.prior, machine, free or ()),
+        "loss": words["loss"] if words["rule"] == "auto" else tuple(words.values()),
+        "unknown": _unknown(job, measured),
+        "holdout": held,
+        "per_session": _anew(job),
+        "fix": fixed,
+        "drop": dropped,
+        "effects": _effects(job),
+        "uncertainty": read_uncertainty(job.uncertainty, job.consider, machine),
+    }
+
+
+def _rows(
+    job: Calibration, sources: Sources, tell: Tell
+) -> tuple[list[Measurements], float | Measurements | None, list[int | Found]]:
+    """Measurements to fit, those to hold out, and the rows to leave out."""
+    measured = list(sources.measured)
+    held: float | Measurements | None = sources.held
+    if held is None and job.holdout is not None:
+        number = typed(job.holdout)
+        held = int(number) if number.is_integer() else number
+    if job.approach is not None:
+        measured = [_approached(job.approach, each) for each in measured]
+        held = _approached(job.approach, held) if isinstance(held, Measurements) else held
+    if job.session or _anew(job):
+        files = [Path(each) for each in job.files]
+        measured, held = in_sessions(files, measured, job.session, job.holdout, held)
+    if job.tracker is not None:
+        tracker = read_tracker(job.tracker)
+        measured = [_seen_by(tracker, each) for each in measured]
+    if job.drop and job.drop_outliers:
+        raise ArgumentError("--drop names rows, --drop-outliers finds them: one of the two")
+    named: Sequence[str] = job.drop
+    if isinstance(held, Measurements):
+        named, held = without_lines(named, held, measured, tell)
+    dropped: list[int | Found] = [*rows_to_drop(named, measured)]
+    found: dict[Found, bool] = {"outliers": job.drop_outliers, "slack": job.drop_slack}
+    return measured, held, [*dropped, *(each for each, asked in found.items() if asked)]
+
+
+def _free(job: Calibration, machine: Calibratable) -> tuple[list[str] | None, list[str]]:
+    """Numbers to identify, and those to hold; None: all that the machine's file frees."""
+    datum = word("--datum", job.datum, ("none", "auto")) == "auto"
+    fixed = matching("--fix", machine, job.fix)
+    held = [*fixed, *["datum"] * datum]
+    if job.free == ("none",):  # frame, tool and lens alone
+        return [], held
+    free = [name for name in free_names(machine, job.free) if name not in fixed]
+    if fixed and not free:
+        raise ArgumentError(f"--fix {','.join(job.fix)}: no parameter is left free")
+    return free or None, held
+
+
+def _effects(job: Calibration) -> Any:
+    moving = read_effects(job.effects or ["none"])
+    coefficients = read_coefficients("--expansion", job.expansion)
+    if coefficients is None:
+        return moving
+    if moving == AUTO:
+        raise ArgumentError(f"{OPTION} auto is for arms, --expansion for other machines")
+    return [*moving, Expansion(coefficients)]
+
+
+def _anew(job: Calibration) -> list[str]:
+    """Names of numbers that are found anew in each session."""
+    return [name.strip() for text in job.per_session for name in text.split(",")]
+
+
+def _unknown(job: Calibration, measured: Sequence[Measurements]) -> dict[Role, Known | list[Known]]:
+    """What ``--frame``, ``--target`` and ``--attachment`` say of each file."""
+    return {
+        "frame": _known("--frame", job.frame, measured),
+        "target": _known("--target", job.target, measured),
+        "attachment": _known("--attachment", job.attachment, measured),
+    }
+
+
+def _known(option: str, text: str, measured: Sequence[Measurements]) -> Known | list[Known]:
+    """One word for all files, or one for each."""
+    words = [word(option, part.strip(), KNOWN) for part in text.split(",")]
+    if len(words) not in (1, len(measured)):
+        raise ArgumentError(f"{option} {text}: {len(words)} words for {len(measured)} files")
+    return words[0] if len(words) == 1 else words
+
+
+def read_tracker(text: str) -> Tracker:
+    """Return the tracker of ``--tracker``: three deviations in mm and deg, and its place in mm.
+
+    Raises
+    ------
+    ValueError
+        Not three or six numbers, or not positive.
+    """
+    try:
+        numbers = [typed(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) not in (3, 6):
+        raise ArgumentError(
+            f"--tracker {text}: expected RANGE,AZIMUTH,ELEVATION or those and X,Y,Z"
+        )
+    far, azimuth, elevation, x, y, z = [*numbers, 0.0, 0.0, 0.0][:6]
+    try:
+        return Tracker(far, math.radians(azimuth), math.radians(elevation), position=(x, y, z))
+    except ValueError as error:
+        raise ArgumentError(f"--tracker {text}: {error}") from None
+
+
+def _seen_by(tracker: Tracker, measured: Measurements) -> Measurements:
+    if measured.instrument.components != POINT:
+        raise ArgumentError(
+            f"--tracker: a tracker measures positions, the file has {measured.kind}s"
+        )
+    return replace(measured, sigma=tracker.covariance(measured.values))
+
+
+def _approached(text: str, measured: Measurements) -> Measurements:
+    word("--approach", text, ("order",))
+    if measured.approach is not None:
+        raise ArgumentError(f"--approach: {measured.file} has columns approach")
+    return replace(measured, approach="order")  # type: ignore[arg-type]

@@ -1,0 +1,83 @@
+"""What pixels of boards show to be wrong with a lens, or with the numbers of the corners."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.core import screws
+from pkmcal.readings.board_poses import BoardPoses, board_poses
+
+_FALLS = (
+    3.0  # times less that corners are off with another lens, from which on that is the right one
+)
+_CLEAR = 0.3  # px that corners are off at least, to doubt a lens
+_MIDDLE = 0.1  # share of a picture by which the principal point is off its middle, at most
+_EXCHANGED = (1, 0, 3, 2, 4, 5, 7, 6, 8)  # numbers of a lens where x is y
+
+
+def lens_doubts(
+    corner: FloatArray,
+    pixel: FloatArray,
+    lens: FloatArray,
+    picture: IntArray,
+    size: tuple[int, int],
+) -> Iterator[str]:
+    """Sentences on what is wrong.
+
+    Parameters
+    ----------
+    corner : ndarray (N, 3)
+        In axes of the board, mm.
+    pixel : ndarray (N, 2)
+        Where they are seen.
+    lens : ndarray (9,)
+        fx fy cx cy k1 k2 p1 p2 k3.
+    picture : ndarray of int (N,)
+        Which picture each is of, 0 … P - 1.
+    size : (int, int)
+        Width and height of pictures, px; 0: not known.
+    """
+    found = board_poses(corner, pixel, lens, picture)
+    off = _typical(found)
+    if off > _CLEAR:
+        straight = np.where(np.arange(9) < 4, lens, 0.0)
+        flat = _typical(board_poses(corner, pixel, straight, picture))
+        if flat * _FALLS < off:
+            yield (
+                f"the pictures have been rectified: corners are {off:.3g} px off with the"
+                f" distortion of the lens and {flat:.3g} px without; state the lens of rectified"
+                " pictures, without distortion"
+            )
+    ends = np.array([end or 1.0 + most for end, most in zip(size, pixel.max(axis=0), strict=True)])
+    if (np.abs(lens[2:4] / ends - 0.5) > _MIDDLE).any():
+        turned = _typical(board_poses(corner, pixel, lens[list(_EXCHANGED)], picture))
+        if turned * _FALLS < max(off, _CLEAR):
+            yield (
+                f"the lens is that of turned pictures: its middle {lens[2]:.0f}, {lens[3]:.0f} is"
+                f" far from that of pixels up to {ends[0]:.0f}, {ends[1]:.0f}, and with x and y"
+                f" exchanged corners are {turned:.3g} px off in place of {off:.3g}; exchange fx and"
+                " fy, cx and cy, p1 and p2, or turn the pictures as the lens was calibrated"
+            )
+    behind = int((_facing(found) < 0.0).sum())
+    if behind > len(found.pose) / 2:
+        yield (
+            f"the board is seen from behind in {behind} of {len(found.pose)} pictures: pictures are"
+            " mirrored, or corners numbered from the other side; places on the board are mirrored"
+            " then, and with mirrored pictures nothing fits"
+        )
+
+
+def _typical(found: BoardPoses) -> float:
+    """What corners of the median picture are off, px."""
+    rms = found.rms[:, 0]
+    return float(np.median(rms[np.isfinite(rms)])) if np.isfinite(rms).any() else float("inf")
+
+
+def _facing(found: BoardPoses) -> FloatArray:
+    """Above 0 where a board is seen from the front (P,), its z pointing away from the camera."""
+    motion = screws.frames(np.ascontiguousarray(found.pose[:, 0]))
+    facing: FloatArray = (motion[:, :3, 2] * motion[:, :3, 3]).sum(axis=1)
+    return facing

@@ -1,0 +1,147 @@
+"""Pictures of a board: lenses that are not theirs, mirrors, level plans, pictures of other rows."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pkmcal as pk
+from pkmcal.readings import Board, Camera
+
+BOARD = Board.chessboard(6, 5, 35)
+LENS = {
+    "fx": 1500.0, "fy": 1505.0, "cx": 640.0, "cy": 400.0, "k1": -0.15, "k2": 0.1, "p1": 1e-3,
+    "p2": -5e-4, "width": 1280, "height": 800,
+}  # fmt: skip
+SCATTER, NOISE = 0.01, 0.1  # mm of legs, px
+FREE = ["base*", "platform*", "offset*"]
+
+
+def pictures(
+    count: int = 24, tilt: float = 1.0, off: dict[int, float] | None = None, **lens: float
+) -> pk.Measurements:
+    """Of a board on a hexapod with errors, below a camera; some picture is mm off its row."""
+    random, drawn = np.random.default_rng(3), pk.load("hexapod")
+    names = drawn.geometry.match(FREE)
+    true = drawn.replace({n: drawn.geometry[n] + random.normal(0.0, 0.3) for n in names})
+    carried = pk.screw.from_pose(np.array([0, 0, 20, np.pi + 0.02, 0.03, 0.3]))
+    carried[:3, 3] += [0, 0, 20] - carried[:3, :3] @ BOARD.places.mean(axis=0) - carried[:3, 3]
+    camera = Camera(
+        **{**LENS, **lens}, stands=[-150, 120, 1950, 3.0, 0.1, 0.2],
+        carried=pk.screw.to_pose(carried),
+    )  # fmt: skip
+    poses = pk.sample_poses(drawn, 200, seed=1, share=0.25)
+    poses[:, 3:] *= tilt
+    told = drawn.inverse(poses)
+    moved = true.forward(told + random.normal(0.0, SCATTER, told.shape)).pose
+    for picture, mm in (off or {}).items():
+        moved[picture, :3] += mm * np.array([0.6, -0.64, 0.48])
+    at, seeing = camera.seeing(true.inverse(moved), BOARD)
+    seen = pk.VirtualMachine(true, NOISE, 5).measure(at, seeing)
+    corners = len(BOARD.ids)
+    whole = np.isfinite(seen.values).all(axis=1).reshape(-1, corners).all(axis=1)
+    assert whole[:count].sum() >= 0.9 * count
+    rows = np.flatnonzero(np.repeat(whole, corners) & (np.arange(len(at)) < count * corners))
+    own = seen.select(rows)
+    return pk.Measurements(
+        np.repeat(told, corners, axis=0)[rows], own.values, own.instrument, group=rows // corners
+    )
+
+
+def checks(measured: pk.Measurements, **options: Any) -> tuple[pk.Identification, dict[str, str]]:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", pk.CalibrationWarning)
+        found = pk.identify(pk.load("hexapod"), measured, FREE, fix="datum", **options)
+    return found, {each.check: each.text for each in found.verdict.said}
+
+
+@pytest.fixture(scope="module")
+def sound() -> pk.Measurements:
+    return pictures()
+
+
+def with_lens(measured: pk.Measurements, **numbers: float) -> pk.Measurements:
+    return replace(measured, instrument=replace(measured.instrument, **numbers))
+
+
+def test_sound_pictures_are_not_doubted(sound: pk.Measurements) -> None:
+    found, said = checks(sound)
+    assert "doubtful-readings" not in said and "hardly-turned" not in said
+    assert found.outliers == ()
+    assert found.component_noise[0] == pytest.approx((NOISE, NOISE), rel=0.1)
+    assert found.actuator_noise == pytest.approx(SCATTER, rel=0.3)
+
+
+def doubts(measured: pk.Measurements) -> str:
+    return " ".join(measured.instrument.doubts(measured))
+
+
+def test_rectified_pictures_with_the_lens_of_others_are_said(sound: pk.Measurements) -> None:
+    straight = {"k1": 0.0, "k2": 0.0, "p1": 0.0, "p2": 0.0}
+    bent = {**straight, "k1": -0.45, "k2": 0.3}
+    rectified = with_lens(pictures(**straight), **bent)
+    assert "rectified" in doubts(rectified) and not doubts(sound)
+    assert not doubts(with_lens(rectified, **straight))
+
+
+def test_the_lens_of_turned_pictures_is_said(sound: pk.Measurements) -> None:
+    turned = {"fx": "fy", "cx": "cy", "p1": "p2"} | {"fy": "fx", "cy": "cx", "p2": "p1"}
+    wrong = with_lens(sound, **{name: LENS[of] for name, of in turned.items()})
+    assert "turned pictures" in doubts(wrong)
+    unknown_size = with_lens(wrong, width=0, height=0)
+    assert "turned pictures" in doubts(unknown_size)
+
+
+def test_mirrored_pictures_and_numbers_from_the_other_side_are_said(sound: pk.Measurements) -> None:
+    """With numbers from the other side the same fits: the board then is turned by half a turn."""
+    width = LENS["width"]
+    values = sound.values.copy()
+    values[:, 0] = width - 1 - values[:, 0]
+    mirrored = with_lens(replace(sound, values=values), cx=width - 1 - LENS["cx"])
+    assert "mirrored" in doubts(mirrored)
+    behind = with_lens(sound, corner=np.asarray(sound.instrument.corner) * [-1, 1, 1])
+    assert "seen from behind" in doubts(behind)
+    fits = [
+        pk.identify(pk.load("hexapod"), replace(each, actuator_sigma=0.0), free=[])
+        for each in (sound, behind)
+    ]
+    assert "doubtful-readings" in {each.check for each in fits[1].verdict.said}
+    one, other = (fit.residuals[0] for fit in fits)
+    np.testing.assert_allclose(one, other, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("tilt", "words"),
+    [(0.0, "all turned alike"), ([0, 0, 1], "about one axis alone")],
+)
+def test_plans_that_do_not_turn_are_doubtful_and_named(tilt: Any, words: str) -> None:
+    """Frames alone are found; tilts are told by the poses, which the nominal machine knows."""
+    measured = replace(pictures(tilt=tilt), actuator_sigma=0.0)
+    found = pk.identify(pk.load("hexapod"), measured, free=[])
+    (text,) = (each.text for each in found.verdict.said if each.check == "hardly-turned")
+    assert words in text and found.verdict.state != "calibrated"
+
+
+def test_machines_that_cannot_turn_are_not_asked_to() -> None:
+    robot = pk.load("linear-delta")
+    q = robot.inverse(pk.sample_poses(robot, 30, seed=0))
+    carried = pk.screw.to_pose(pk.screw.exp(np.array([0, np.pi, 0, 0, 0, 0])))
+    camera = Camera(fx=1500.0, fy=1500.0, stands=[0, 0, 800, np.pi, 0, 0], carried=carried)
+    at, seeing = camera.seeing(q, Board.chessboard(4, 3, 10))
+    found = pk.identify(robot, pk.VirtualMachine(robot, 0.1).measure(at, seeing), fix="datum")
+    assert "hardly-turned" not in {each.check for each in found.verdict.said}
+
+
+@pytest.mark.parametrize(("mm", "which"), [(0.6, (7,)), (1.2, (5, 16))])
+def test_a_picture_of_another_row_is_named_and_no_sound_one(
+    mm: float, which: tuple[int, ...]
+) -> None:
+    measured = pictures(off=dict.fromkeys(which, mm))
+    found, _ = checks(measured)
+    named = {int(each) for each in measured.group[list(found.outliers)]}
+    assert named == {*which}
+    assert len(found.outliers) == len(which) * len(BOARD.ids)  # whole pictures

@@ -1,0 +1,70 @@
+"""Plans of pictures: what is in the picture, how it is tilted, and what the plan promises."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import pkmcal as pk
+from pkmcal.readings import Board, Camera
+
+BOARD = Board.chessboard(5, 4, 30)
+FREE = ["base*", "platform*", "offset*"]
+
+
+@pytest.fixture(scope="module")
+def camera() -> Camera:
+    middle = BOARD.places.mean(axis=0)
+    return Camera(
+        fx=1500, fy=1500, cx=600, cy=450, width=1201, height=901, board=BOARD,
+        stands=[0, 0, 1900, np.pi, 0, 0], carried=[-middle[0], middle[1], 20, np.pi, 0, 0],
+    )  # fmt: skip
+
+
+def test_poses_are_those_at_which_the_whole_board_is_seen(
+    hexapod: pk.Robot, camera: Camera
+) -> None:
+    candidates = pk.sample_poses(hexapod, 120, seed=2, share=0.9)
+    plan = pk.plan_poses(
+        hexapod, candidates, count=20, kind=camera, noise=0.1, free=FREE, criterion="D"
+    )
+    at, seeing = camera.seeing(plan.actuators, BOARD)
+    assert np.isfinite(pk.VirtualMachine(hexapod, 0.0).measure(at, seeing).values).all()
+    assert plan.left_out > 0 and len(plan) == 20
+    level = candidates * [1, 1, 1, 0, 0, 0]
+    tilted = np.degrees(np.abs(plan.poses[:, 3:5]).max(axis=1))
+    assert np.median(tilted) > 5.0
+    flat = pk.plan_poses(
+        hexapod, level, count=20, kind=camera, noise=0.1, free=FREE, prior=1.0, criterion="D"
+    )
+    tilts = pk.plan_poses(
+        hexapod, candidates, count=20, kind=camera, noise=0.1, free=FREE, prior=1.0, criterion="D"
+    )
+    # what level pictures tell of the platform is a part only
+    assert np.median(flat.stderr / tilts.stderr) > 1.3
+    behind = camera.with_fields({"carried": [0, 0, 0, 0, 0, 0]})
+    with pytest.raises(ValueError, match="in the picture"):
+        pk.plan_poses(hexapod, candidates, count=20, kind=behind, noise=0.1, free=FREE)
+
+
+def test_a_plan_promises_what_a_calibration_by_its_pictures_gives(
+    hexapod: pk.Robot, camera: Camera
+) -> None:
+    """Deviations of the plan against those of the fit, of numbers that a prior holds as well."""
+    candidates = pk.sample_poses(hexapod, 60, seed=3, share=0.6)
+    plan = pk.plan_poses(
+        hexapod, candidates, count=12, kind=camera, noise=0.1, free=FREE, prior=0.5, criterion="A"
+    )
+    at, seeing = camera.seeing(plan.actuators, BOARD)
+    measured = pk.VirtualMachine(hexapod, 0.1, 1).measure(at, seeing)
+    group = np.repeat(np.arange(12), len(BOARD.ids))
+    measured = pk.Measurements(
+        at, measured.values, measured.instrument, sigma=0.1, actuator_sigma=0.0, group=group
+    )
+    found = pk.identify(hexapod, measured, FREE, prior=0.5, loss=("linear", "classical"))
+    own = dict(zip(found.free, found.stderr, strict=True))
+    shared = [name for name in plan.parameters if name in own and not name.startswith(("f", "t"))]
+    assert len(shared) == 42
+    promised = dict(zip(plan.parameters, plan.stderr, strict=True))
+    ratio = np.array([own[name] / promised[name] for name in shared])
+    np.testing.assert_allclose(ratio, 1.0, atol=0.1)
