@@ -7,9 +7,10 @@ from typing import Annotated
 
 import typer
 
-from pkmcal.cli.inputs import Inputs
 from pkmcal.cli.options import Force, Json
-from pkmcal.cli.output import Output, say
+from pkmcal.cli.output import say
+from pkmcal.jobs.inputs import Inputs
+from pkmcal.jobs.output import Output
 from pkmcal.readings.boards import Board
 from pkmcal.report.as_json import as_json
 

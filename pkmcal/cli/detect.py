@@ -7,10 +7,11 @@ from typing import Annotated
 
 import typer
 
-from pkmcal.cli.inputs import Inputs
 from pkmcal.cli.options import Force, Json
-from pkmcal.cli.output import Output, say
+from pkmcal.cli.output import say
 from pkmcal.cli.progress import progress
+from pkmcal.jobs.inputs import Inputs
+from pkmcal.jobs.output import Output
 from pkmcal.readings.boards import Board
 from pkmcal.readings.camera import Camera
 from pkmcal.report.as_json import as_json
