@@ -1,4 +1,4 @@
-"""The project of a window: a folder with the user's files, and one plain file that says what is asked.
+"""The project of a window: a folder of the user's files, and one plain file of what is asked.
 
 Nothing else is a state. The file is written whole at every change; every change has a number, so
 that of two tabs that change the same state the second is told.
@@ -111,7 +111,8 @@ class Folder:
         for name in _named(project):
             parts = Path(name).parts
             inside = parts and not Path(name).is_absolute() and ".." not in parts
-            if not inside or self.written(name) is None:
+            made = project.importing is not None and parts[:1] == Path(project.importing.out).parts
+            if not inside or not (made or self.written(name) is not None):
                 raise ArgumentError(f"there is no file {json.dumps(name)} in this project")
 
     @staticmethod
@@ -122,6 +123,7 @@ class Folder:
 def _named(project: Project) -> list[str]:
     """Return the files that a project names, the machine's first."""
     job, reading = project.calibration, project.calibration.reading
-    machine = job.table().get("machine", {}).get("file")
+    importing = project.importing
+    machine = importing.file if importing else job.table().get("machine", {}).get("file")
     others = (reading.controller, reading.columns, reading.camera, job.held_file)
     return [name for name in (machine, *job.files, *others) if name]

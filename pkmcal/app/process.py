@@ -14,7 +14,9 @@ from pathlib import Path
 from typing import Any
 
 _LONGEST_LINE = 2**28  # bytes of one message
-_FAILED = "the computing process ended{how}; it is started again, and nothing of your project is lost"
+_FAILED = (
+    "the computing process ended{how}; it is started again, and nothing of your project is lost"
+)
 
 Message = dict[str, Any]
 

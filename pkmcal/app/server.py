@@ -12,6 +12,7 @@ import os
 import secrets
 import tempfile
 from collections.abc import AsyncIterator
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -94,6 +95,7 @@ class Server:
             "folder": str(folder.path),
             "undo": folder.undoable,
             "commands": commands(folder.project),
+            "machines": _built_in(),
         }
 
     async def change(self, request: Request) -> Response:
@@ -224,6 +226,14 @@ class Server:
         return JSONResponse({"worker": self._worker.pid, "starts": self._worker.starts})
 
 
+@cache
+def _built_in() -> list[str]:
+    """Return the names of all built-in machines, as files that nobody has to read."""
+    folders = (files("pkmcal.builtin").joinpath(kind) for kind in ("machines", "arms"))
+    found = [each.name for folder in folders for each in folder.iterdir()]
+    return sorted(name.removesuffix(".toml") for name in found if name.endswith(".toml"))
+
+
 def guarded(folder: Folder, port: int, token: str, testing: bool = False) -> Application:
     """Return the whole application: routes behind the guard."""
     operations = OPERATIONS + FOR_TESTS * testing
@@ -245,7 +255,7 @@ async def _body(request: Request) -> bytes:
 
 
 def _static(path: str, name: str) -> Route:
-    content = files("pkmcal.app").joinpath("page", name).read_bytes()
+    content = files("pkmcal.app").joinpath(f"page/{name}").read_bytes()
     return _constant(path, content, _KINDS[Path(name).suffix])
 
 

@@ -38,9 +38,7 @@ def free(robot: Robot | SerialArm) -> Sequence[str]:
     return tuple(as_machine(robot).geometry.names)
 
 
-def calibration(
-    found: Identification, job: Calibration, lines: Sequence[tuple[str, int]]
-) -> Table:
+def calibration(found: Identification, job: Calibration, lines: Sequence[tuple[str, int]]) -> Table:
     """Return what a page shows of a fit.
 
     Parameters
@@ -65,6 +63,7 @@ def calibration(
         "summary": found.summary(),
         "rows": rows,
         "numbers": _numbers(found),
+        "machine": list(free(found.robot)),
         "others": [name for name in free(found.robot) if name not in set(found.free)],
         "dropped": [_dropped(row, lines) for row in found.dropped],
         "outliers": [int(row) for row in found.outliers],
@@ -81,7 +80,12 @@ def _said(said: Any, job: Calibration) -> Table:
             continue  # of which only the user knows the value
         if changed != job:
             remedies.append({"option": remedy.option, "fit": changed.table().get("fit", {})})
-    return {"check": said.check, "level": LEVELS[said.level], "text": said.text, "remedies": remedies}
+    return {
+        "check": said.check,
+        "level": LEVELS[said.level],
+        "text": said.text,
+        "remedies": remedies,
+    }
 
 
 def _rows(
@@ -92,7 +96,9 @@ def _rows(
     places = measured_places(found)
     points = contents.points(found)
     if len(points) > _MOST_ROWS:
-        worst = np.argsort([-each["after"] if np.isfinite(each["after"]) else 0.0 for each in points])
+        worst = np.argsort(
+            [-each["after"] if np.isfinite(each["after"]) else 0.0 for each in points]
+        )
         points = [points[i] for i in sorted(worst[:_MOST_ROWS].tolist())]
     index = {int(row): k for k, row in enumerate(found.rows)}
     rows, arrows = [], []
@@ -149,7 +155,9 @@ def certificate(stated: Mapping[str, object]) -> str:
 
     for name, value in stated.items():
         if name not in _STATEMENTS or not isinstance(value, str):
-            raise ArgumentError(f"certificate: {printable(str(name))} is none of {', '.join(_STATEMENTS)}")
+            raise ArgumentError(
+                f"certificate: {printable(str(name))} is none of {', '.join(_STATEMENTS)}"
+            )
     return tomli_w.dumps({name: value for name, value in stated.items() if value})
 
 

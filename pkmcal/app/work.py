@@ -1,4 +1,4 @@
-"""What the window computes: a machine and its picture, a plan, files as read, a fit, what is taken away.
+"""What the window computes: a machine, a plan, files as read, a fit, what is taken away.
 
 Each operation takes the table of the project and what the page gives besides, and returns plain
 data. Words of results are those of the package.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import difflib
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -21,16 +22,17 @@ import numpy as np
 
 import pkmcal as pk
 from pkmcal.app import telling
-from pkmcal.app.commands import REPORT
+from pkmcal.app.commands import REPORT, export
 from pkmcal.checks.check_geometry import check_geometry
 from pkmcal.exceptions import ArgumentError, Error
 from pkmcal.files.reading import MOST_TABLE
 from pkmcal.jobs import calibrating
 from pkmcal.jobs.calibration import Writing
 from pkmcal.jobs.inputs import Inputs
+from pkmcal.jobs.output import Output
 from pkmcal.jobs.project import Project
 from pkmcal.jobs.stated import quoted
-from pkmcal.jobs.written import Written
+from pkmcal.jobs.written import Written, save_robot
 from pkmcal.view import page
 
 Table = dict[str, Any]
@@ -59,10 +61,11 @@ class Work:
     def read(self, project: Project) -> calibrating.Sources:
         """Read the files of a calibration, if they or what is asked of them changed."""
         job = project.calibration
-        key = (job.sources, tuple(sorted((each.name, each.stat().st_mtime_ns, each.stat().st_size)
-                                         for each in Path().glob("*") if each.is_file())))  # fmt: skip
+        files = (each for each in Path().glob("*") if each.is_file())
+        times = ((each.name, each.stat().st_mtime_ns, each.stat().st_size) for each in files)
+        key = (job.sources, tuple(sorted(times)))
         if self.sources is None or key != self.key:
-            inputs, notes = Inputs(), []
+            inputs, notes = Inputs(), list[str]()
             self.sources = calibrating.read(job, inputs, notes.append)
             self.key, self.inputs, self.notes = key, inputs, notes
             self.fitted = None
@@ -105,9 +108,13 @@ def plan(work: Work, state: Table, given: Table, say: Say) -> Table:
     """Choose poses, and write them as the command does."""
     project = Project.of_table(state)
     say("choosing poses")
-    lines = _run([*project.planning.argv(), "--force"])
+    lines = _run([*project.planning.argv(project.calibration.robot), "--force"])
     table = np.genfromtxt(project.planning.commands, delimiter=",", skip_header=1, comments="#")
-    return {"text": lines, "file": str(project.planning.commands), "rows": len(np.atleast_2d(table))}
+    return {
+        "text": lines,
+        "file": str(project.planning.commands),
+        "rows": len(np.atleast_2d(table)),
+    }
 
 
 def look(work: Work, state: Table, given: Table, say: Say) -> Table:
@@ -144,18 +151,29 @@ def out(work: Work, state: Table, given: Table, say: Say) -> Table:
     """Write the calibrated machine and the configuration, and say what changes in it."""
     project = Project.of_table(state)
     found = work.fit(project)
-    _written(work, project, found, Writing(out=REPORT, force=True))
+    sources = work.read(project)
+    with Output(Path(REPORT), ["robot.toml"], work.inputs, True).draft() as draft:
+        save_robot(found, draft / "robot.toml", work.inputs, project.calibration.robot)
     files = [_file(f"{REPORT}/robot.toml", "the calibrated machine")]
+    commands = [export(target) for target in project.targets]
+    robot = sources.robot
+    if isinstance(robot, pk.Robot) and robot.model.controller:
+        commands.insert(0, shlex.split(robot.model.controller.command(f"{REPORT}/robot.toml")))
     changed: list[str] = []
-    for number, export in enumerate(project.exports):
-        say(f"writing {export.out}", 0.3 + 0.6 * number / len(project.exports))
-        lines = _run([*export.argv(), "--force"])
-        files.insert(0, _file(str(export.out), *lines))
-        if export.config:
+    for number, command in enumerate(commands):
+        options = dict(zip(command[3::2], command[4::2], strict=False))
+        name, config = options["--out"], options.get("--config")
+        say(f"writing {name}", 0.3 + 0.6 * number / len(commands))
+        try:
+            files.append(_file(name, *_run([*command, "--force"])))
+        except ArgumentError as error:
+            files.append(_file("", str(error)))
+            continue
+        if config:
             old, new = (Path(each).read_text("utf-8", "replace").splitlines()
-                        for each in (export.config, export.out))  # fmt: skip
-            changed += difflib.unified_diff(old, new, export.config, str(export.out), n=1, lineterm="")
-    return {"files": files, "changed": changed}
+                        for each in (config, name))  # fmt: skip
+            changed += difflib.unified_diff(old, new, config, name, n=1, lineterm="")
+    return {"files": files, "changed": changed, "commands": [quoted(each) for each in commands]}
 
 
 def report(work: Work, state: Table, given: Table, say: Say) -> Table:
@@ -170,7 +188,10 @@ def report(work: Work, state: Table, given: Table, say: Say) -> Table:
     asked = Writing(
         report=REPORT, certificate="certificate.toml" if certificate else None, force=True
     )
-    _written(work, project, found, asked)
+    sources = work.read(project)
+    Written.planned(asked, project.calibration.robot, sources.robot, work.inputs).write_report(
+        found
+    )
     command = quoted([*project.calibration.argv(), *asked.options()])
     return {"files": [_file(f"{REPORT}/report.html", "the report, one file that needs no network"),
                       _file(f"{REPORT}/report.json", "all results as data")],
@@ -204,15 +225,6 @@ def told(error: BaseException) -> Table:
         if isinstance(value, str | int):
             found[name] = value
     return found
-
-
-def _written(work: Work, project: Project, found: pk.Identification, asked: Writing) -> None:
-    sources = work.read(project)
-    written = Written.planned(asked, project.calibration.robot, sources.robot, work.inputs)
-    if written.machine is not None:
-        written.write_machine(found)
-    if written.report is not None:
-        written.write_report(found)
 
 
 def _run(argv: list[str]) -> list[str]:

@@ -18,7 +18,9 @@ def app(
     ] = Path("pkmcal-project"),
     browser: Annotated[
         bool,
-        typer.Option("--browser/--no-browser", help="Open it in the browser, or print where it is."),
+        typer.Option(
+            "--browser/--no-browser", help="Open it in the browser, or print where it is."
+        ),
     ] = True,
     port: Annotated[
         int, typer.Option(metavar="PORT", min=0, max=65535, help="0: one that is free.")

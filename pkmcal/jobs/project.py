@@ -13,11 +13,14 @@ from typing import Any, NoReturn
 
 from pkmcal.exceptions import FileError
 from pkmcal.jobs.calibration import Calibration
+from pkmcal.jobs.importing import Importing
+from pkmcal.jobs.planning import Planning
 from pkmcal.jobs.stated import Refuse, refused
 
 VERSION = 1
 _VERSION = "pkmcal-project"
 _CALIBRATION = ("machine", "measured", "fit")
+_OTHERS = ("import", "plan", "export")
 _ESCAPES = {'"': '\\"', "\\": "\\\\", "\n": "\\n", "\t": "\\t", "\r": "\\r"}
 
 
@@ -29,6 +32,12 @@ class Project:
     ----------
     calibration : Calibration
         The tables machine, measured and fit.
+    importing : Importing or None
+        The table import: of which configuration the machine is made.
+    planning : Planning
+        The table plan.
+    targets : tuple of str
+        What the calibrated machine is exported for, beside its firmware: `as` of the table export.
 
     Examples
     --------
@@ -49,10 +58,19 @@ class Project:
     """
 
     calibration: Calibration = field(default=Calibration())
+    importing: Importing | None = None
+    planning: Planning = field(default=Planning())
+    targets: tuple[str, ...] = ()
 
     def table(self) -> dict[str, Any]:
         """What the file says, in plain values."""
-        return {_VERSION: VERSION, **self.calibration.table()}
+        others = {
+            "import": self.importing.table() if self.importing else {},
+            "plan": self.planning.table(),
+            "export": {"as": list(self.targets)} if self.targets else {},
+        }
+        stated = {name: part for name, part in others.items() if part}
+        return {_VERSION: VERSION, **self.calibration.table(), **stated}
 
     @classmethod
     def of_table(cls, table: Mapping[str, Any], refuse: Refuse | None = None) -> Project:
@@ -68,9 +86,21 @@ class Project:
         if version != VERSION or isinstance(version, bool):
             refuse(_VERSION, f"must be {VERSION}, the version of project files, found {version!r}")
         for key in table:
-            if key not in (_VERSION, *_CALIBRATION):
+            if key not in (_VERSION, *_CALIBRATION, *_OTHERS):
                 refuse(key, f"unknown key {key!r} of a project")
-        return cls(Calibration.of_table(table, refuse))
+        parts = {name: _part(table, name, refuse) for name in _OTHERS}
+        importing = Importing.of_table(parts["import"], _within("import", refuse))
+        if parts["import"] and importing.file is None:
+            refuse("import", "file is missing: the configuration")
+        targets = parts["export"].get("as", [])
+        if set(parts["export"]) - {"as"} or not _texts(targets):
+            refuse("export", f"must be as = [TARGET, …], found {parts['export']!r}")
+        return cls(
+            Calibration.of_table(table, refuse),
+            importing if parts["import"] else None,
+            Planning.of_table(parts["plan"], _within("plan", refuse)),
+            tuple(targets),
+        )
 
     def text(self) -> str:
         """The file."""
@@ -99,7 +129,25 @@ class Project:
 
     def within(self, folder: str | Path) -> Project:
         """The same with its relative paths below a folder."""
-        return Project(self.calibration.within(str(folder)))
+        path = str(folder)
+        importing = self.importing.within(path) if self.importing else None
+        planning = self.planning.within(path)
+        return Project(self.calibration.within(path), importing, planning, self.targets)
+
+
+def _within(name: str, refuse: Refuse) -> Refuse:
+    return lambda key, why: refuse(f"{name}.{key}", why)
+
+
+def _part(table: Mapping[str, Any], name: str, refuse: Refuse) -> Mapping[str, Any]:
+    part = table.get(name, {})
+    if not isinstance(part, Mapping):
+        refuse(name, f"must be a table, found {part!r}")
+    return part
+
+
+def _texts(value: object) -> bool:
+    return isinstance(value, list) and all(isinstance(each, str) for each in value)
 
 
 def toml(table: Mapping[str, Any]) -> str:

@@ -1,5 +1,5 @@
 // What is taken away: the changed configuration, the calibrated machine, the report.
-import { app, button, change, choice, field, made, work } from './frame.js'
+import { app, button, change, choice, field, frame, made, work } from './frame.js'
 import { save } from './transport.js'
 
 const STATEMENTS = ['machine', 'serial', 'customer', 'operator', 'date', 'instrument', 'temperature', 'method']
@@ -8,6 +8,8 @@ const TARGETS = [['c', 'C header'], ['linuxcnc', 'LinuxCNC'], ['mjcf', 'MuJoCo']
 export async function out(main) {
   made('h1', main, { text: 'Take it away' })
   const found = await work('out', 'writing')
+  app.project.commands.out = found.commands
+  frame()
   const lines = made('section', main)
   if (found.changed.length) {
     made('h2', lines, { text: 'What changes in your configuration' })
@@ -17,7 +19,7 @@ export async function out(main) {
   const list = made('ul', main, { className: 'files' })
   const offer = ({ file, what }) => {
     const item = made('li', list)
-    button(item, `Save ${file}`, () => save(file), { className: 'first', 'data-file': file })
+    if (file) button(item, `Save ${file}`, () => save(file), { className: 'first', 'data-file': file })
     made('span', item, { text: what })
   }
   found.files.forEach(offer)
@@ -37,8 +39,8 @@ export async function out(main) {
     made_.files.forEach(offer)
   }
   const extra = made('div', main, { className: 'settings' })
-  const there = new Set((app.project.state.export ?? []).map?.(each => each.as))
+  const there = new Set(app.project.state.export?.as ?? [])
   choice(extra, 'for another controller', [['', '…'], ...TARGETS.filter(([key]) => !there.has(key))], '', async target => {
-    if (target && await change(table => { table.export = [...(table.export ?? []), target] })) await app.screens.out((main.replaceChildren(), main))
+    if (target && await change(table => { table.export = { as: [...there, target] } })) await app.screens.out((main.replaceChildren(), main))
   })
 }
