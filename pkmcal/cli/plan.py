@@ -13,6 +13,14 @@ import typer
 from pkmcal.arguments import did_you_mean, word
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray
+from pkmcal.cli.camera_options import (
+    BoardSeen,
+    CameraAt,
+    CameraOn,
+    Lens,
+    LookAt,
+    planned_camera,
+)
 from pkmcal.cli.load_options import Yielding
 from pkmcal.cli.options import Force, Free, Json, Prior, RobotOrArm, Seed
 from pkmcal.cli.output import say
@@ -70,8 +78,8 @@ def plan(
         str,
         typer.Option(
             metavar="KIND",
-            help="What is measured: position, pose, height, distance, orientation or closure. Of"
-            " several how many poses of each: position=20,distance=10.",
+            help="What is measured: position, pose, height, distance, orientation, closure or pixel"
+            " (pictures of a board). Of several how many poses of each: position=20,distance=10.",
         ),
     ] = "position",
     target: Annotated[
@@ -119,6 +127,11 @@ def plan(
         ),
     ] = None,
     compliance: Yielding = None,
+    lens: Lens = None,
+    camera_on: CameraOn = "base",
+    board: BoardSeen = None,
+    camera_at: CameraAt = None,
+    look_at: LookAt = None,
     free: Free = None,
     prior: Prior = None,
     unknown: Annotated[
@@ -162,6 +175,13 @@ def plan(
     used = None if targets is None else _places(machine, read.file(targets))
     kinds = _kinds(kind)
     several = isinstance(kinds, dict)
+    if several and "pixel" in kinds:
+        raise ArgumentError(f"--kind {kind}: pictures are planned by themselves")
+    pictures = None
+    if kinds == "pixel":
+        pictures = planned_camera(lens, camera_on, board, camera_at, look_at)
+    elif lens is not None or board is not None:
+        raise ArgumentError("--camera, --board: they are of pictures; state --kind pixel")
     if several and (count is not None or accuracy is not None):
         raise ArgumentError(f"--kind {kind}: says how many poses, without --count and --accuracy")
     commands = [f"commands-{each}.csv" for each in kinds] if several else ["commands.csv"]
@@ -175,7 +195,7 @@ def plan(
             accuracy=accuracy,
             targets=used,
             criterion=word("--criterion", criterion, CRITERIA),
-            kind=kinds,
+            kind=kinds if pictures is None else pictures,
             target=_points(target or [], kinds),
             noise=_noise(noise, kinds),
             actuator_noise=actuator_noise,

@@ -283,7 +283,10 @@ def plan_poses(
     mounted = not all(as_reading(each).placed for each in kinds)
     able = read_at(machine, q, kinds)
     if not able.any():
-        raise ArgumentError(f"candidates: at none of {len(q)} is all in the picture")
+        raise ArgumentError(
+            f"candidates: at none of {len(q)} is the whole board in the picture: offer"
+            " poses at which it is before the camera (--poses, --within)"
+        )
     poses, q, inside = poses[able], q[able], inside[able]
     aims = (poses, q) if targets is None else _aims(machine, targets)
     distinct, place = np.unique(q, axis=0, return_inverse=True)

@@ -85,6 +85,22 @@ def unbent(pixel: FloatArray, lens: FloatArray) -> FloatArray:
     return found
 
 
+def mm_per_pixel(corner: FloatArray, pixel: FloatArray) -> float:
+    """What a pixel is at a board, mm, by its picture as if from far away.
+
+    NaN where corners (k, 3) are in a line.
+    """
+    if len(corner) < 3:
+        return float("nan")
+    away = corner - corner.mean(axis=0)
+    size, axes = np.linalg.svd(away, full_matrices=False)[1:]
+    across = axes[size > 1e-6 * size[0]]
+    if len(across) < 2:
+        return float("nan")
+    image = np.linalg.lstsq(away @ across.T, pixel - pixel.mean(axis=0), rcond=None)[0]
+    return 1.0 / float(np.linalg.norm(image, ord=2))
+
+
 def _guessed(
     corner: FloatArray, direction: FloatArray, picture: IntArray
 ) -> tuple[FloatArray, FloatArray]:

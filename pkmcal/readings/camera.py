@@ -25,7 +25,7 @@ from pkmcal.core import instruments, screws
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.csv_table import Table
 from pkmcal.readings import rows, twists
-from pkmcal.readings.board_poses import board_poses, unbent
+from pkmcal.readings.board_poses import board_poses, mm_per_pixel, unbent
 from pkmcal.readings.boards import Board
 from pkmcal.readings.lens_doubts import lens_doubts
 from pkmcal.readings.lens_files import read_lens
@@ -121,6 +121,7 @@ class Camera(Reading):
     framed = True
     placed: ClassVar[bool] = False
     tells_actuators: ClassVar[bool] = True
+    scaled_by: ClassVar[str] = "board"
     frame_order: ClassVar[int] = 5
     own_points = ("corner",)
     truth = ("stands", "carried")
@@ -303,7 +304,7 @@ class Camera(Reading):
         known = np.flatnonzero(np.isfinite(m.values).all(axis=1))
         order = known[np.argsort(picture[known], kind="stable")]
         ends = np.flatnonzero(np.diff(picture[order])) + 1
-        sizes = [_mm_per_pixel(corner[own], m.values[own]) for own in np.split(order, ends)]
+        sizes = [mm_per_pixel(corner[own], m.values[own]) for own in np.split(order, ends)]
         told = [each for each in sizes if np.isfinite(each)]
         focal = max(self.fx, self.fy)
         return np.full(2, float(np.median(told)) if told else length / focal)
@@ -389,16 +390,3 @@ class Camera(Reading):
             )
         places = self.board.at(table.integers("corner"))
         return self.with_fields({"corner": places, "board": None})
-
-
-def _mm_per_pixel(corner: FloatArray, pixel: FloatArray) -> float:
-    """By the picture of a board (k, 3) as if from far away; NaN where corners are in a line."""
-    if len(corner) < 3:
-        return float("nan")
-    away = corner - corner.mean(axis=0)
-    size, axes = np.linalg.svd(away, full_matrices=False)[1:]
-    across = axes[size > 1e-6 * size[0]]
-    if len(across) < 2:
-        return float("nan")
-    image = np.linalg.lstsq(away @ across.T, pixel - pixel.mean(axis=0), rcond=None)[0]
-    return 1.0 / float(np.linalg.norm(image, ord=2))

@@ -163,6 +163,9 @@ class Reading:
     tells_actuators : bool
         Whether readings of one pose are so many and so precise that they tell how well the
         actuators were read, which is then estimated where it is not stated.
+    scaled_by : str
+        Something whose stated size is the only length in its readings, in a word; "" where the
+        readings are lengths themselves or have none.
     frame_order : int
         Of readings in one frame, whose place that frame where a search begins: the least number's.
     is_place : bool
@@ -206,6 +209,7 @@ class Reading:
     framed: ClassVar[bool] = False
     placed: ClassVar[bool] = True
     tells_actuators: ClassVar[bool] = False
+    scaled_by: ClassVar[str] = ""
     frame_order: ClassVar[int] = 9
     is_place: ClassVar[bool] = False
     point: ClassVar[Literal["platform", "base", ""]] = ""

@@ -145,3 +145,35 @@ def test_a_picture_of_another_row_is_named_and_no_sound_one(
     named = {int(each) for each in measured.group[list(found.outliers)]}
     assert named == {*which}
     assert len(found.outliers) == len(which) * len(BOARD.ids)  # whole pictures
+
+
+@pytest.mark.parametrize(
+    ("machine", "free", "size", "level"),
+    [
+        ("hexapod", ["base*"], False, None),
+        ("hexapod", ["base*"], True, None),
+        ("hexapod", ["base*", "gain*"], False, "remark"),
+        ("hexapod", ["base*", "gain*"], True, "doubt"),
+        ("6-rus", ["base*"], False, "remark"),
+        ("6-rus", ["base*", "crank*", "rod*", "platform*"], True, "doubt"),
+    ],
+)
+def test_what_alone_tells_the_size_of_a_machine_is_named(
+    machine: str, free: list[str], size: bool, level: str | None
+) -> None:
+    """Where turning drives, or gains are found, a board of unknown size leaves a scale open."""
+    robot = pk.load(machine)
+    height = float(robot.home[2])
+    camera = Camera(
+        fx=1500.0, fy=1500.0, stands=[0, 0, height + 900, np.pi, 0, 0], find_size=size,
+        carried=[0, 0, 0, np.pi, 0, 0],
+    )  # fmt: skip
+    poses = pk.sample_poses(robot, 20, seed=0, share=0.2)
+    at, seeing = camera.seeing(robot.inverse(poses), Board.chessboard(4, 3, 30))
+    measured = pk.VirtualMachine(robot, 0.05).measure(at, seeing)
+    measured = replace(measured, actuator_sigma=0.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", pk.CalibrationWarning)
+        found = pk.identify(robot, measured, free)
+    levels = {each.check: each.level for each in found.verdict.said}
+    assert levels.get("scale") == level

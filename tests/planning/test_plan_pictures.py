@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -68,3 +72,24 @@ def test_a_plan_promises_what_a_calibration_by_its_pictures_gives(
     promised = dict(zip(plan.parameters, plan.stderr, strict=True))
     ratio = np.array([own[name] / promised[name] for name in shared])
     np.testing.assert_allclose(ratio, 1.0, atol=0.1)
+
+
+def test_pictures_are_planned_on_the_command_line(
+    run: Callable[..., Any], refused: Callable[..., str], tmp_path: Path
+) -> None:
+    lens = tmp_path / "lens.yaml"
+    lens.write_text(
+        "image_width: 1200\nimage_height: 900\n"
+        "camera_matrix: {rows: 3, cols: 3, data: [1700, 0, 600, 0, 1700, 450, 0, 0, 1]}\n"
+    )
+    seen = ["--camera", lens, "--board", "chessboard:6x5,30"]
+    where = ["--camera-at", "450,-500,2000", "--look-at", "60,40,800"]
+    out = tmp_path / "plan"
+    plan = ["plan", "hexapod", "--count", 15, "--kind", "pixel", "--noise", 0.1]
+    result = run(*plan, *seen, *where, "--out", out)
+    assert result.exit_code == 0 and "measure 15 poses" in result.stdout, result.output
+    assert len(np.genfromtxt(out / "commands.csv", delimiter=",", skip_header=3)) >= 14
+    assert "--look-at" in refused(*plan, *seen)
+    assert "--kind pixel" in refused("plan", "hexapod", *seen)
+    assert "--look-at" in refused(*plan, *seen, *where[:3], "60,40")
+    assert "in the picture" in refused(*plan, *seen, *where[:2], "--look-at", "60,40,8000")

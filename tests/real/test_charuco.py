@@ -116,3 +116,19 @@ def test_the_board_is_found_in_15_of_16_pictures(flange: Path) -> None:
     other = np.array([there[each] for each in zip(names, found.corner.tolist(), strict=True)])
     assert np.abs(np.median(found.pixel - other, axis=0)).max() < 0.05
     assert np.median(np.linalg.norm(found.pixel - other, axis=1)) < 0.3
+
+
+def test_mirrors_are_said_and_mirrored_numbers_fit_as_well(flange: Path) -> None:
+    arm, measured = read(flange)
+    camera = measured.instrument
+    assert not list(camera.doubts(measured))
+    values = measured.values.copy()
+    values[:, 0] = 1599 - values[:, 0]
+    mirrored = replace(measured, values=values, instrument=replace(camera, cx=1599 - camera.cx))
+    assert "mirrored" in " ".join(mirrored.instrument.doubts(mirrored))
+    behind = replace(camera, corner=np.asarray(camera.corner) * [-1, 1, 1])
+    numbers = replace(measured, instrument=behind)
+    assert "seen from behind" in " ".join(behind.doubts(numbers))
+    fits = [pk.identify(arm, each, free=[]) for each in (measured, numbers)]
+    assert off(fits[1]) == pytest.approx(off(fits[0]), abs=1e-6)
+    assert "doubtful-readings" in {each.check for each in fits[1].verdict.said}

@@ -23,7 +23,7 @@ COMMANDS = [
     shlex.split(line)[1:]
     for block in re.findall(r"^```sh\n(.*?)^```$", PAGE.read_text("utf-8"), re.M | re.S)
     for line in block.splitlines()
-    if line.startswith("pkmcal ")
+    if line.startswith("pkmcal ") and not line.startswith("pkmcal plan ")
 ]
 
 
