@@ -107,12 +107,14 @@ class Folder:
         self.version += 1
 
     def _inside(self, project: Project) -> None:
-        """Refuse files that are not in the folder."""
+        """Refuse files that are not in the folder, and places to write that are not."""
+        importing = project.importing
+        made = importing.out if importing else None
+        if made is not None and _outside(made) or _outside(project.planning.out):
+            raise ArgumentError("out: a folder within this project is expected")
         for name in _named(project):
-            parts = Path(name).parts
-            inside = parts and not Path(name).is_absolute() and ".." not in parts
-            made = project.importing is not None and parts[:1] == Path(project.importing.out).parts
-            if not inside or not (made or self.written(name) is not None):
+            below = made is not None and Path(name).parts[:1] == Path(made).parts  # not yet there
+            if _outside(name) or not (below or self.written(name) is not None):
                 raise ArgumentError(f"there is no file {json.dumps(name)} in this project")
 
     @staticmethod
@@ -122,8 +124,15 @@ class Folder:
 
 def _named(project: Project) -> list[str]:
     """Return the files that a project names, the machine's first."""
-    job, reading = project.calibration, project.calibration.reading
-    importing = project.importing
-    machine = importing.file if importing else job.table().get("machine", {}).get("file")
-    others = (reading.controller, reading.columns, reading.camera, job.held_file)
-    return [name for name in (machine, *job.files, *others) if name]
+    job, reading, importing = project.calibration, project.calibration.reading, project.importing
+    board = reading.board if reading.board and reading.board.lower().endswith(".csv") else None
+    configuration = (importing.file, importing.log) if importing else ()
+    machine = job.table().get("machine", {}).get("file")
+    others = (reading.controller, reading.columns, reading.camera, board, job.held_file)
+    return [name for name in (machine, *configuration, *job.files, *others) if name]
+
+
+def _outside(path: str) -> bool:
+    """Whether a path may lead out of the folder, or is the folder itself."""
+    parts = Path(path).parts
+    return not parts or Path(path).is_absolute() or ".." in parts or "\0" in path

@@ -7,7 +7,7 @@ import os
 import secrets
 import socket
 import webbrowser
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import uvicorn
@@ -58,21 +58,18 @@ def launch(
         listening.listen(_QUEUE)  # a fast browser is here before the server is
         port = listening.getsockname()[1]
         url = f"http://{HOST}:{port}/#t={token}"
-        application = guarded(folder, port, token, testing)
+        door = _door(folder.path, url, browser)
         config = uvicorn.Config(
-            application, log_level="error", access_log=False, proxy_headers=False,
-            server_header=False, timeout_graceful_shutdown=1, lifespan="on",
+            guarded(folder, port, token, door, testing), log_level="error", access_log=False,
+            proxy_headers=False, server_header=False, timeout_graceful_shutdown=1, lifespan="on",
         )  # fmt: skip
-        with _door(folder.path, url) as door:
-            say(f"{folder.path}\n{url}")
-            if browser:
-                webbrowser.open(door.as_uri())
-            uvicorn.Server(config).run(sockets=[listening])
+        say(f"{folder.path}\n{url}")
+        uvicorn.Server(config).run(sockets=[listening])
 
 
 @contextlib.contextmanager
-def _door(folder: Path, url: str):  # type: ignore[no-untyped-def]
-    """A file that only its owner reads and that leads to the page.
+def _door(folder: Path, url: str, browser: bool) -> Iterator[None]:
+    """Keep a file that only its owner reads and that leads to the page, and open it.
 
     A browser's arguments are in everybody's list of processes, so the token is not among them.
     """
@@ -81,6 +78,8 @@ def _door(folder: Path, url: str):  # type: ignore[no-untyped-def]
     with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as file:
         file.write(_DOOR.format(url=url))
     try:
-        yield path
+        if browser:
+            webbrowser.open(path.as_uri())
+        yield
     finally:
         path.unlink(missing_ok=True)

@@ -41,8 +41,14 @@ _SILENT = 15.0  # s, after which a stream of events says that it is there
 class Server:
     """What answers the page of one project."""
 
-    def __init__(self, folder: Folder, worker: Worker, operations: tuple[str, ...]) -> None:
-        self._folder, self._worker, self._operations = folder, worker, operations
+    def __init__(
+        self,
+        folder: Folder,
+        worker: Worker,
+        operations: tuple[str, ...],
+        door: contextlib.AbstractContextManager[None],
+    ) -> None:
+        self._folder, self._worker, self._operations, self._door = folder, worker, operations, door
         self._listeners: set[asyncio.Queue[Message]] = set()
         self._running: dict[str, asyncio.Event] = {}
 
@@ -51,9 +57,10 @@ class Server:
 
         @contextlib.asynccontextmanager
         async def life(_: Starlette) -> AsyncIterator[None]:
-            await self._worker.start()  # it imports while the page is opened
-            yield
-            await self._worker.stop()
+            with self._door:  # uvicorn ends by the signal that it got: nothing after it runs
+                await self._worker.start()  # it imports while the page is opened
+                yield
+                await self._worker.stop()
 
         return Starlette(
             lifespan=life,
@@ -170,25 +177,24 @@ class Server:
         stopped = self._running[job] = asyncio.Event()
         messages = self._worker.run(operation, state=self._folder.project.table(), given=asked)
         stop = asyncio.ensure_future(stopped.wait())
+        following: asyncio.Future[Message | None] = asyncio.ensure_future(anext(messages, None))
         try:
             yield _line({"job": job})
             while True:
-                following = asyncio.ensure_future(anext(messages, None))
                 await asyncio.wait({following, stop}, return_when=asyncio.FIRST_COMPLETED)
                 if not following.done():
-                    following.cancel()
-                    with contextlib.suppress(asyncio.CancelledError):
-                        await following
+                    await _ended(following)
                     yield _line({"error": {"message": "stopped", "stopped": True}})
                     return
                 message = following.result()
                 if message is None:
                     return
                 yield _line(message)
-        finally:
+                following = asyncio.ensure_future(anext(messages, None))
+        finally:  # also where the tab was closed
             stop.cancel()
             self._running.pop(job, None)
-            await messages.aclose()  # type: ignore[attr-defined]  # it is a generator
+            await asyncio.shield(_ended(following))
 
     async def cancel(self, request: Request) -> Response:
         """Stop a job at once."""
@@ -234,15 +240,28 @@ def _built_in() -> list[str]:
     return sorted(name.removesuffix(".toml") for name in found if name.endswith(".toml"))
 
 
-def guarded(folder: Folder, port: int, token: str, testing: bool = False) -> Application:
-    """Return the whole application: routes behind the guard."""
+def guarded(
+    folder: Folder,
+    port: int,
+    token: str,
+    door: contextlib.AbstractContextManager[None],
+    testing: bool = False,
+) -> Application:
+    """Return the whole application: routes behind the guard; `door` is open while it is there."""
     operations = OPERATIONS + FOR_TESTS * testing
-    server = Server(folder, Worker(folder.path), operations)
+    server = Server(folder, Worker(folder.path), operations, door)
     return Guard(server.application(), port, token)
 
 
 class _TooLarge(Exception):
     """A request has more bytes than it may have."""
+
+
+async def _ended(task: asyncio.Future[Any]) -> None:
+    """End a task, and wait until it has ended."""
+    task.cancel()
+    with contextlib.suppress(asyncio.CancelledError):
+        await task
 
 
 async def _body(request: Request) -> bytes:

@@ -67,7 +67,9 @@ def page_of(served: Served, **context: Any) -> Iterator[Any]:
         page.set_default_timeout(60_000)
         said: list[str] = []
         elsewhere: list[str] = []
-        page.on("console", lambda m: said.append(m.text) if m.type in ("error", "warning") else None)
+        page.on(
+            "console", lambda m: said.append(m.text) if m.type in ("error", "warning") else None
+        )
         page.on("pageerror", lambda error: said.append(str(error)))
         own = (f"http://127.0.0.1:{served.port}/", "blob:", "data:")
         page.on("request", lambda r: None if r.url.startswith(own) else elsewhere.append(r.url))
