@@ -5,10 +5,13 @@ from __future__ import annotations
 from pathlib import PurePath
 
 from pkmcal.jobs.calibration import Writing
+from pkmcal.jobs.configuration import Exporting
 from pkmcal.jobs.project import Project
 from pkmcal.jobs.stated import quoted
 
-REPORT = "report"  # folder of the calibrated machine
+REPORT, PLAN = "report", "plan"  # folders of the calibrated machine, and of planned poses
+_NAMES = {"c": "machine.h", "linuxcnc": "linuxcnc", "mjcf": "machine.xml", "fmu": "machine.fmu",
+          "urdf": "machine.urdf", "sdf": "machine.sdf"}  # fmt: skip
 
 
 def commands(project: Project) -> dict[str, list[str]]:
@@ -22,19 +25,16 @@ def commands(project: Project) -> dict[str, list[str]]:
     if project.importing is not None:
         lines["machine"].append(quoted(project.importing.argv()))
     lines["machine"].append(quoted(["pkmcal", "show", job.robot, "--out", "machine.html"]))
-    lines["plan"].append(quoted(project.planning.argv(job.robot)))
+    lines["plan"].append(quoted([*project.plan.argv(), "--out", PLAN]))
     if job.files:
         reading = [*job.files, *job.reading.options()]
         lines["measure"].append(quoted(["pkmcal", "check", job.robot, *reading]))
         lines["result"].append(quoted([*job.argv(), *Writing(report=REPORT).options()]))
-        lines["out"] += [quoted(export(target)) for target in project.targets]
+        lines["out"] += [quoted(export(target).argv()) for target in project.targets]
     return lines
 
 
-def export(target: str) -> list[str]:
-    """Return the command that writes the calibrated machine for a controller."""
-    names = {"c": "machine.h", "linuxcnc": "linuxcnc", "mjcf": "machine.xml", "fmu": "machine.fmu",
-             "urdf": "machine.urdf", "sdf": "machine.sdf"}  # fmt: skip
-    robot = str(PurePath(REPORT) / "robot.toml")
-    out = names.get(target, f"{target}.txt")
-    return ["pkmcal", "export", robot, "--as", target, "--out", out]
+def export(target: str) -> Exporting:
+    """Return what writes the calibrated machine for a controller."""
+    name = _NAMES.get(target, f"{target}.txt")
+    return Exporting(str(PurePath(REPORT) / "robot.toml"), target, name)

@@ -7,6 +7,7 @@ that of two tabs that change the same state the second is told.
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,11 @@ from pkmcal.app.names import safe_name
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.atomic import write_whole
 from pkmcal.jobs.project import Project
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
 
 FILE = "project.toml"
 OWN = (FILE, "robot.toml", "commands.csv")  # names that are pkmcal's; a user's file gets another
@@ -40,8 +46,7 @@ class Folder:
         path.mkdir(parents=True, exist_ok=True)
         self.path = path.resolve()
         file = self.path / FILE
-        text = file.read_bytes() if file.is_file() else Project().text().encode()
-        self.project = Project.of_text(text, str(file))
+        self.project = _read(file) if file.is_file() else Project()
         self.version = 1
         self._before: list[Project] = []
 
@@ -110,7 +115,7 @@ class Folder:
         """Refuse files that are not in the folder, and places to write that are not."""
         importing = project.importing
         made = importing.out if importing else None
-        if made is not None and _outside(made) or _outside(project.planning.out):
+        if made is not None and _outside(made):
             raise ArgumentError("out: a folder within this project is expected")
         for name in _named(project):
             below = made is not None and Path(name).parts[:1] == Path(made).parts  # not yet there
@@ -122,13 +127,26 @@ class Folder:
         return path.is_file() and not path.name.startswith(".") and path.name != FILE
 
 
+def _read(file: Path) -> Project:
+    """Read a project file; what says where a mistake is takes the packages that compute."""
+    text = file.read_bytes()
+    try:
+        return Project.of_table(tomllib.loads(text.decode()))
+    except ValueError:
+        return Project.of_text(text, str(file))
+
+
 def _named(project: Project) -> list[str]:
     """Return the files that a project names, the machine's first."""
-    job, reading, importing = project.calibration, project.calibration.reading, project.importing
-    board = reading.board if reading.board and reading.board.lower().endswith(".csv") else None
+    job, plan, importing = project.calibration, project.plan, project.importing
+    reading = job.reading
+    boards = (
+        each for each in (reading.board, plan.board) if each and each.lower().endswith(".csv")
+    )
     configuration = (importing.file, importing.log) if importing else ()
     machine = job.table().get("machine", {}).get("file")
-    others = (reading.controller, reading.columns, reading.camera, board, job.held_file)
+    read = (reading.controller, reading.columns, reading.camera, job.held_file)
+    others = (*read, *boards, plan.poses, plan.targets, plan.camera)
     return [name for name in (machine, *configuration, *job.files, *others) if name]
 
 

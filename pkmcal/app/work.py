@@ -10,24 +10,22 @@ import difflib
 import os
 import shlex
 import signal
-import subprocess
-import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 import pkmcal as pk
 from pkmcal.app import telling
-from pkmcal.app.commands import REPORT, export
+from pkmcal.app.commands import PLAN, REPORT, export
 from pkmcal.checks.check_geometry import check_geometry
-from pkmcal.exceptions import ArgumentError, Error
+from pkmcal.exceptions import Error
 from pkmcal.files.reading import MOST_TABLE
-from pkmcal.jobs import calibrating
+from pkmcal.geometry.controller import Controller
+from pkmcal.jobs import calibrating, exporting, importing, planning
 from pkmcal.jobs.calibration import Writing
+from pkmcal.jobs.configuration import Exporting
 from pkmcal.jobs.inputs import Inputs
 from pkmcal.jobs.output import Output
 from pkmcal.jobs.project import Project
@@ -86,35 +84,39 @@ def machine(work: Work, state: Table, given: Table, say: Say) -> Table:
     """Take in a firmware's configuration, check the machine, and show it."""
     project = Project.of_table(state)
     notes: list[str] = []
+    inputs = Inputs()
     if project.importing is not None:
         say("reading the configuration")
-        notes = _run([*project.importing.argv(), "--force"])
-    robot = pk.load(Inputs().robot(project.calibration.robot))
+        printer = importing.run(project.importing, inputs)
+        importing.write(project.importing, printer, inputs, force=True)
+        notes = str(printer).splitlines()
+    robot = pk.load(inputs.robot(project.calibration.robot))
     say("drawing the machine", 0.5)
     found = check_geometry(robot)
-    probe = Path("machine", "probe.csv")
-    stored = project.importing is not None and probe.is_file()
+    stored = [] if project.importing is None else list(importing.tables(printer))
+    folder = Path(project.calibration.robot).parent
     return {
         "name": robot.name,
         "findings": [telling.finding(each) for each in found.findings],
         "notes": notes,
-        "stored": str(probe) if stored else "",
+        "stored": [str(folder / name) for name in stored],
         "free": list(telling.free(robot)),
         "view": page.machine(robot),
     }
 
 
 def plan(work: Work, state: Table, given: Table, say: Say) -> Table:
-    """Choose poses, and write them as the command does."""
-    project = Project.of_table(state)
-    say("choosing poses")
-    lines = _run([*project.planning.argv(project.calibration.robot), "--force"])
-    table = np.genfromtxt(project.planning.commands, delimiter=",", skip_header=1, comments="#")
-    return {
-        "text": lines,
-        "file": str(project.planning.commands),
-        "rows": len(np.atleast_2d(table)),
-    }
+    """Choose poses, write them as the command does, and show them."""
+    project, inputs = Project.of_table(state), Inputs()
+    robot = planning.machine(project.plan, inputs)
+    say("choosing poses", 0.1)
+    made = planning.run(project.plan, robot, inputs)
+    output = Output(Path(PLAN), planning.files(project.plan), inputs, True)
+    with output.draft() as draft:
+        planning.write(made, draft, inputs.comment())
+    shown = page.machine(made.robot, cloud=False)
+    shown["places"] = page.places("planned poses", made.robot, made.poses)
+    return {"text": str(made), "files": [str(each) for each in output.paths], "view": shown}
 
 
 def look(work: Work, state: Table, given: Table, say: Say) -> Table:
@@ -155,25 +157,24 @@ def out(work: Work, state: Table, given: Table, say: Say) -> Table:
     with Output(Path(REPORT), ["robot.toml"], work.inputs, True).draft() as draft:
         save_robot(found, draft / "robot.toml", work.inputs, project.calibration.robot)
     files = [_file(f"{REPORT}/robot.toml", "the calibrated machine")]
-    commands = [export(target) for target in project.targets]
+    exports = [export(target) for target in project.targets]
     robot = sources.robot
     if isinstance(robot, pk.Robot) and robot.model.controller:
-        commands.insert(0, shlex.split(robot.model.controller.command(f"{REPORT}/robot.toml")))
+        exports.insert(0, own_export(robot.model.controller, f"{REPORT}/robot.toml"))
     changed: list[str] = []
-    for number, command in enumerate(commands):
-        options = dict(zip(command[3::2], command[4::2], strict=False))
-        name, config = options["--out"], options.get("--config")
-        say(f"writing {name}", 0.3 + 0.6 * number / len(commands))
+    for number, job in enumerate(exports):
+        say(f"writing {job.out}", 0.3 + 0.6 * number / len(exports))
+        name = str(job.out)
         try:
-            files.append(_file(name, *_run([*command, "--force"])))
-        except ArgumentError as error:
+            files.append(_file(name, str(exporting.run(job, Inputs(), force=True))))
+        except Error as error:
             files.append(_file("", str(error)))
             continue
-        if config:
+        if job.config is not None:
             old, new = (Path(each).read_text("utf-8", "replace").splitlines()
-                        for each in (config, name))  # fmt: skip
-            changed += difflib.unified_diff(old, new, config, name, n=1, lineterm="")
-    return {"files": files, "changed": changed, "commands": [quoted(each) for each in commands]}
+                        for each in (job.config, name))  # fmt: skip
+            changed += difflib.unified_diff(old, new, job.config, name, n=1, lineterm="")
+    return {"files": files, "changed": changed, "commands": [quoted(job.argv()) for job in exports]}
 
 
 def report(work: Work, state: Table, given: Table, say: Say) -> Table:
@@ -227,13 +228,11 @@ def told(error: BaseException) -> Table:
     return found
 
 
-def _run(argv: list[str]) -> list[str]:
-    """Run a command as the terminal does, and return the lines that it prints."""
-    done = subprocess.run([sys.executable, "-m", *argv], capture_output=True, text=True,
-                          encoding="utf-8", check=False)  # fmt: skip
-    if done.returncode not in (0, 1):
-        raise ArgumentError(done.stderr.strip().removeprefix("pkmcal: ") or done.stdout.strip())
-    return [*done.stdout.strip().splitlines(), *done.stderr.strip().splitlines()]
+def own_export(controller: Controller, robot: str) -> Exporting:
+    """Return what writes a robot file into the configuration that it was made of."""
+    words = shlex.split(controller.command(robot))
+    options = dict(zip(words[3::2], words[4::2], strict=True))
+    return Exporting(robot, options["--as"], options["--out"], config=options.get("--config"))
 
 
 def _head(name: str) -> list[str]:

@@ -311,7 +311,7 @@ def _of_project(path: Path, context: typer.Context) -> Calibration:
         if each.name not in beside and source is not None and source.name == "COMMANDLINE":
             raise ArgumentError(f"--project says what {each.opts[0]} says: one of the two")
     content = Inputs().file(path).content(MOST_ROBOT)
-    return Project.of_text(content, str(path)).within(path.parent).calibration
+    return Project.of_text(content, str(path)).in_folder(path.parent).calibration
 
 
 def _say_written(written: Written, found: Identification, rigid: object) -> None:

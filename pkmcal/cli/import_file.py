@@ -7,16 +7,12 @@ from typing import Annotated, get_args
 
 import typer
 
-import pkmcal as pk
-from pkmcal.arguments import word
 from pkmcal.cli.options import Force, Json
 from pkmcal.cli.output import say
 from pkmcal.controllers.firmwares import Firmware
+from pkmcal.jobs import importing
+from pkmcal.jobs.configuration import Importing
 from pkmcal.jobs.inputs import Inputs
-from pkmcal.jobs.output import Output
-from pkmcal.kinematics.reading_units import reading_units
-from pkmcal.measurements.measurement_writer import write_measurements
-from pkmcal.measurements.measurements import Measurements
 from pkmcal.report.as_json import as_json
 
 # What is counted in which file.
@@ -24,6 +20,7 @@ _TABLES = {"probe.csv": "heights", "distances.csv": "distances", "belts.csv": "p
 
 
 def import_file(
+    context: typer.Context,
     file: Annotated[Path, typer.Argument(metavar="FILE", help="A printer.cfg; M665 and M666.")],
     out: Annotated[
         Path, typer.Option(metavar="DIR", help="Where to write; made if it is not there.")
@@ -57,22 +54,16 @@ def import_file(
     Example: pkmcal import examples/linear-delta/printer.cfg
     """
     read = Inputs()
-    whose = None if firmware is None else word("--from", firmware, get_args(Firmware))
-    belts = None if log is None else read.file(log)
-    printer = pk.import_printer(read.file(file), whose, log=belts)
-    tables = _tables(printer)
-    output = Output(out, ["robot.toml", *tables], read, force)
-    with output.draft() as draft:
-        (draft / "robot.toml").write_bytes((read.comment() + printer.text).encode())
-        for name, measured in tables.items():
-            units = reading_units(printer.robot)
-            write_measurements(measured, draft / name, read.comment(), units)
+    job = Importing.of_options(context.params)
+    printer = importing.run(job, read)
+    paths = importing.write(job, printer, read, force)
     if json:
+        tables = importing.tables(printer)
         counts = {what: len(tables.get(name, ())) for name, what in _TABLES.items()}
         probe = printer.robot.model.probe
         found = {
             "robot": printer.robot.name,
-            "files": [str(path) for path in output.paths],
+            "files": [str(path) for path in paths],
             **counts,
             "probe_offset": None if probe is None else probe.tolist(),
             "notes": list(printer.notes),
@@ -80,13 +71,5 @@ def import_file(
         say(as_json(found, schema="import"))
     else:
         say(printer)
-        say("written: " + ", ".join(map(str, output.paths)))
+        say("written: " + ", ".join(map(str, paths)))
     return 0
-
-
-def _tables(printer: pk.export.Printer) -> dict[str, Measurements]:
-    """What was measured, by the file it is written to."""
-    stored = printer.measurements
-    places = stored is not None and not stored.components
-    found = {"belts.csv" if places else "probe.csv": stored, "distances.csv": printer.distances}
-    return {name: measured for name, measured in found.items() if measured is not None}

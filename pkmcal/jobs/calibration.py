@@ -5,12 +5,12 @@ from __future__ import annotations
 import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
-from importlib import resources
 from typing import TYPE_CHECKING, Any
 
 from pkmcal.exceptions import ArgumentError
+from pkmcal.jobs.machine import in_folder, machine_of_table, machine_table
 from pkmcal.jobs.reading import Reading
-from pkmcal.jobs.stated import PathText, Refuse, Stated, below, command, refused
+from pkmcal.jobs.stated import PathText, Refuse, Stated, below, command, of, refused
 
 if TYPE_CHECKING:
     from pkmcal.diagnostics.check import Remedy
@@ -100,31 +100,23 @@ class Calibration(Stated):
         ValueError
             An unknown key, or a value that is none of this key.
         """
-
-        def within(name: str) -> Refuse:
-            return lambda key, why: (refuse or refused)(f"{name}.{key}", why)
-
-        parts = {}
-        for name in ("machine", "measured", "fit"):
-            parts[name] = table.get(name, {})
-            if not isinstance(parts[name], Mapping):
-                (refuse or refused)(name, f"must be a table, found {parts[name]!r}")
-        measured = dict(parts["measured"])
-        files = measured.pop("files", [])
+        refuse = refuse or refused
+        measured, of_measured = of(table, "measured", refuse)
+        files = measured.get("files", [])
         if not isinstance(files, list) or not all(isinstance(each, str) for each in files):
-            within("measured")("files", f"must be a list of files, found {files!r}")
+            of_measured("files", f"must be a list of files, found {files!r}")
+        others = {key: value for key, value in measured.items() if key != "files"}
         return cls(
-            machine_of_table(parts["machine"], within("machine")),
+            machine_of_table(*of(table, "machine", refuse)),
             tuple(files),
-            Reading.of_table(measured, within("measured")),
-            **cls.values_of_table(parts["fit"], within("fit")),
+            Reading.of_table(others, of_measured),
+            **cls.values_of_table(*of(table, "fit", refuse)),
         )
 
-    def within(self, folder: str) -> Calibration:
+    def in_folder(self, folder: str) -> Calibration:
         """The same with its relative paths below a folder: those of a project file."""
-        found = replace(super().within(folder), reading=self.reading.within(folder))
-        if self.robot and not is_built_in(self.robot):
-            found = replace(found, robot=below(folder, self.robot))
+        found = replace(super().in_folder(folder), reading=self.reading.in_folder(folder))
+        found = replace(found, robot=in_folder(self.robot, folder))
         if self.held_file is not None:
             found = replace(found, holdout=below(folder, self.held_file))
         return found
@@ -197,29 +189,3 @@ class Writing(Stated):
     certificate: PathText | None = None
     pdf: bool = False
     force: bool = False
-
-
-def machine_table(robot: str) -> dict[str, str]:
-    """The table of a machine: the built-in one of this name, or a file."""
-    return {"builtin" if is_built_in(robot) else "file": robot} if robot else {}
-
-
-def machine_of_table(table: Mapping[str, Any], refuse: Refuse) -> str:
-    """What the table of a machine says: the name of a built-in machine, or a file; or nothing."""
-    for key, value in table.items():
-        if key not in ("builtin", "file"):
-            refuse(key, f"unknown key {key!r} of [machine]; it has builtin or file")
-        if not isinstance(value, str) or not value:
-            refuse(key, f"must be a text, found {value!r}")
-        if len(table) > 1:
-            refuse(key, "a machine is built-in or a file, not both")
-        if key == "builtin" and not is_built_in(value):
-            refuse(key, f"{value!r} is no built-in machine")
-    return next(iter(table.values()), "")
-
-
-def is_built_in(robot: str) -> bool:
-    """Whether this is the name of a built-in machine."""
-    folders = resources.files("pkmcal") / "builtin"
-    files = (folders / kind / f"{robot}.toml" for kind in ("machines", "arms"))
-    return not {"/", "\\", "\0"} & set(robot) and any(file.is_file() for file in files)

@@ -1,51 +1,55 @@
-"""The import of a firmware's configuration, as options and tables say it."""
+"""Makes a robot file and measurements of a configuration, as an `Importing` says."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from pathlib import PurePath
+from pathlib import Path
+from typing import get_args
 
-from pkmcal.jobs.stated import PathText, Stated, command
+from pkmcal.arguments import word
+from pkmcal.controllers.firmwares import Firmware
+from pkmcal.controllers.import_printer import Printer, import_printer
+from pkmcal.jobs.configuration import Importing
+from pkmcal.jobs.inputs import Inputs
+from pkmcal.jobs.output import Output
+from pkmcal.kinematics.reading_units import reading_units
+from pkmcal.measurements.measurement_writer import write_measurements
+from pkmcal.measurements.measurements import Measurements
 
 
-@dataclass(frozen=True)
-class Importing(Stated):
-    """A configuration that becomes a robot file: the options of `pkmcal import`.
+def run(job: Importing, inputs: Inputs) -> Printer:
+    """Read the configuration.
 
-    Attributes
-    ----------
-    file : str
-        The configuration.
-    out : str
-        The folder of robot.toml and of what the configuration had stored.
-    firmware : str or None
-        Whose it is, where it does not show it.
-    log : str or None
-        The log of a Maslow's calibration.
-
-    Examples
-    --------
-    >>> Importing("printer.cfg", out="machine").argv()
-    ['pkmcal', 'import', 'printer.cfg', '--out', 'machine']
-    >>> Importing("printer.cfg", out="machine").robot
-    'machine/robot.toml'
+    Raises
+    ------
+    ValueError
+        A firmware that is not known, or what the configuration cannot hold.
     """
+    whose = None if job.firmware is None else word("--from", job.firmware, get_args(Firmware))
+    log = None if job.log is None else inputs.file(job.log)
+    return import_printer(inputs.file(job.file), whose, log=log)
 
-    OWNER = "[import]"
 
-    file: PathText | None = None
-    out: PathText = "."
-    firmware: str | None = field(default=None, metadata={"option": "from"})
-    log: PathText | None = None
+def write(job: Importing, printer: Printer, inputs: Inputs, force: bool) -> list[Path]:
+    """Write robot file and measurements, and return where they are.
 
-    def argv(self) -> list[str]:
-        """The command line that says the same."""
-        words = self.options()
-        place = words.index("--file")  # which is the argument of the verb
-        file = words[place + 1]
-        return command("import", [file], words[:place] + words[place + 2 :])
+    Raises
+    ------
+    ValueError
+        A file that would be lost.
+    """
+    measured = tables(printer)
+    output = Output(Path(job.out), ["robot.toml", *measured], inputs, force)
+    with output.draft() as draft:
+        (draft / "robot.toml").write_bytes((inputs.comment() + printer.text).encode())
+        for name, each in measured.items():
+            units = reading_units(printer.robot)
+            write_measurements(each, draft / name, inputs.comment(), units)
+    return output.paths
 
-    @property
-    def robot(self) -> str:
-        """The robot file that it makes."""
-        return str(PurePath(self.out) / "robot.toml")
+
+def tables(printer: Printer) -> dict[str, Measurements]:
+    """What was measured, by the file it is written to."""
+    stored = printer.measurements
+    places = stored is not None and not stored.components
+    found = {"belts.csv" if places else "probe.csv": stored, "distances.csv": printer.distances}
+    return {name: measured for name, measured in found.items() if measured is not None}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.number_text import typed
@@ -45,7 +46,7 @@ def loads_by_tool(texts: list[str] | None) -> dict[int, Load]:
     return found
 
 
-def yielding(robot: Robot, compliances: list[str] | None) -> Robot:
+def yielding(robot: Robot, compliances: Sequence[str] | None) -> Robot:
     """The robot with what the options say that yields."""
     found: dict[str, float] = {}
     for text in compliances or ():

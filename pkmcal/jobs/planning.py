@@ -1,51 +1,258 @@
-"""A plan of poses to measure, as options and tables say it."""
+"""Makes a plan of poses of a `Planning`, and writes it."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from pathlib import PurePath
+from collections.abc import Sequence
+from os import PathLike
+from pathlib import Path
+from typing import Any
 
-from pkmcal.jobs.stated import PathText, Stated, command
+import numpy as np
+
+from pkmcal.arguments import did_you_mean, word
+from pkmcal.arms.arm import SerialArm
+from pkmcal.arrays import FloatArray
+from pkmcal.core.library import COORDINATE_UNITS
+from pkmcal.exceptions import ArgumentError
+from pkmcal.files.number_text import typed
+from pkmcal.geometry.box import Box
+from pkmcal.jobs.effects_option import AUTO, OPTION, read_effects
+from pkmcal.jobs.geometry_options import free_names, read_prior
+from pkmcal.jobs.inputs import Inputs
+from pkmcal.jobs.load_options import mass, yielding
+from pkmcal.jobs.plan import Planning
+from pkmcal.jobs.planned_camera import planned_camera
+from pkmcal.kinematics.calibratable import as_machine
+from pkmcal.kinematics.reading_units import reading_units
+from pkmcal.kinematics.robot import Robot
+from pkmcal.kinematics.workspace import sample_poses
+from pkmcal.loading import load
+from pkmcal.measurements.command_csv import read_commands, write_commands
+from pkmcal.measurements.pose_csv import read_poses, write_poses
+from pkmcal.planning.optimal_design import CRITERIA
+from pkmcal.planning.plan_poses import PLANNED, Plan, plan_poses
+from pkmcal.planning.planned import UNKNOWN
+from pkmcal.readings.registry import Kind
+
+DRAWN, _SHARE = 500, 0.9  # candidates where none are given, and how far out they reach
 
 
-@dataclass(frozen=True)
-class Planning(Stated):
-    """What to plan: options of `pkmcal plan`.
+def run(job: Planning, machine: Robot | SerialArm, inputs: Inputs) -> Plan:
+    """Choose the poses of a plan.
 
-    Attributes
+    Parameters
     ----------
-    kind, target, noise, unknown, inside : tuple of str
-        What is measured, where on the platform, how well, what is unknown, where to stay.
-    count : int or None
-        How many poses.
-    accuracy : float or None
-        In place of it: as few as reach this, mm.
-    out : str
-        The folder of poses.csv and commands.csv.
+    job : Planning
+        What is asked for.
+    machine : Robot or SerialArm
+        As `machine` gives it.
+    inputs : Inputs
+        Reads the files, each once.
 
-    Examples
-    --------
-    >>> Planning(kind=("height",), count=20).argv("delta.toml")
-    ['pkmcal', 'plan', 'delta.toml', '--kind', 'height', '--count', '20', '--out', 'plan']
+    Raises
+    ------
+    ValueError
+        An option that says nothing of this machine, or of what is measured.
     """
+    seen = as_machine(machine)
+    free = free_names(seen, job.free)
+    box = _box(machine, job.within)
+    places = None if job.poses is None else _places(machine, inputs.file(job.poses))
+    used = None if job.targets is None else _places(machine, inputs.file(job.targets))
+    kinds = kinds_of(job)
+    several = isinstance(kinds, dict)
+    pictures = planned_camera(job) if kinds == "pixel" else None
+    if pictures is None and (job.camera is not None or job.board is not None):
+        raise ArgumentError("--camera, --board: they are of pictures; state --kind pixel")
+    payloads = [] if job.payloads is None else job.payloads.split(",")
+    return plan_poses(
+        machine,
+        _drawn(machine, box, job.seed) if places is None else places,
+        count=30 if job.count is None and job.accuracy is None and not several else job.count,
+        accuracy=job.accuracy,
+        targets=used,
+        criterion=word("--criterion", job.criterion, CRITERIA),
+        kind=kinds if pictures is None else pictures,
+        target=_points(job.target, kinds),
+        noise=_noise(job.noise, kinds),
+        actuator_noise=job.actuator_noise,
+        travel_weight=job.travel_weight,
+        payloads=[mass("--payloads", each) for each in payloads],
+        effects=_effects(job.effects or ["none"]),
+        free=free or None,
+        prior=read_prior(job.prior, seen, free),
+        unknown=[word("--unknown", each, UNKNOWN) for each in job.unknown],
+    )
 
-    OWNER = "[plan]"
 
-    kind: tuple[str, ...] = ()
-    target: tuple[str, ...] = ()
-    count: int | None = None
-    accuracy: float | None = None
-    noise: tuple[str, ...] = ()
-    unknown: tuple[str, ...] = ()
-    inside: tuple[str, ...] = field(default=(), metadata={"option": "within"})
-    out: PathText = "plan"
+def machine(job: Planning, inputs: Inputs) -> Robot | SerialArm:
+    """The machine of a plan, within where it is to stay."""
+    found: Robot | SerialArm = load(inputs.robot(job.robot))
+    box = _box(found, job.within)
+    return yielding(found.within(box), job.compliance) if isinstance(found, Robot) else found
 
-    def argv(self, robot: str) -> list[str]:
-        """The command line that says the same of a robot."""
-        words = self.options()
-        return command("plan", [robot], [*words, *["--out", "plan"] * ("--out" not in words)])
 
-    @property
-    def commands(self) -> str:
-        """The file of actuator coordinates that it writes."""
-        return str(PurePath(self.out) / "commands.csv")
+def files(job: Planning) -> list[str]:
+    """Names of the files that a plan is written to."""
+    kinds = kinds_of(job)
+    several = isinstance(kinds, dict)
+    commands = [f"commands-{each}.csv" for each in kinds] if several else ["commands.csv"]
+    return ["poses.csv", *commands]
+
+
+def kinds_of(job: Planning) -> Kind | dict[Kind, int]:
+    """What is measured: one kind, or how many poses of each of several.
+
+    Raises
+    ------
+    ValueError
+        No kind, or a number of poses beside those of each kind.
+    """
+    kinds = _kinds(job.kind)
+    if isinstance(kinds, dict) and "pixel" in kinds:
+        raise ArgumentError(f"--kind {job.kind}: pictures are planned by themselves")
+    if isinstance(kinds, dict) and (job.count is not None or job.accuracy is not None):
+        raise ArgumentError(
+            f"--kind {job.kind}: says how many poses, without --count and --accuracy"
+        )
+    return kinds
+
+
+def _kinds(text: str) -> Kind | dict[Kind, int]:
+    """One kind, or how many poses of each of several."""
+    if "=" not in text:
+        return word("--kind", text, PLANNED)
+    found: dict[Kind, int] = {}
+    for part in text.split(","):
+        name, _, number = (each.strip() for each in part.partition("="))
+        if not number.isdecimal():
+            raise ArgumentError(f"--kind {text}: expected KIND=N, such as position=20,distance=10")
+        found[word("--kind", name, PLANNED)] = int(number)
+    return found
+
+
+def _points(given: Sequence[str], kinds: Kind | dict[Kind, int]) -> Any:
+    """Points (k, 3) of all kinds, or by kind; None where none are given."""
+    found: dict[str, list[list[float]]] = {}
+    for text in given:
+        name, equals, numbers = text.partition("=")
+        try:
+            point = [typed(each) for each in (numbers if equals else name).split(",")]
+        except ValueError:
+            point = []
+        if len(point) != 3:
+            raise ArgumentError(f"--target {text}: expected X,Y,Z in mm, or KIND=X,Y,Z")
+        found.setdefault(
+            _of_plan("--target", text, name.strip(), kinds) if equals else "", []
+        ).append(point)
+    return _by_kind("--target", found)
+
+
+def _noise(text: str, kinds: Kind | dict[Kind, int]) -> Any:
+    """Deviations of all kinds, or by kind."""
+    found: dict[str, float] = {}
+    for part in text.split(","):
+        name, equals, number = (each.strip() for each in part.partition("="))
+        try:
+            value = typed(number if equals else name)
+        except ValueError:
+            raise ArgumentError(f"--noise {text}: expected a number, or KIND=NUMBER") from None
+        found[_of_plan("--noise", text, name, kinds) if equals else ""] = value
+    return _by_kind("--noise", found)
+
+
+def _of_plan(option: str, text: str, name: str, kinds: Kind | dict[Kind, int]) -> str:
+    known = [*kinds] if isinstance(kinds, dict) else [kinds]
+    if name not in known:
+        raise ArgumentError(f"{option} {text}: the plan has {', '.join(known)}; found {name!r}")
+    return name
+
+
+def _by_kind(option: str, found: dict[str, Any]) -> Any:
+    """What is for all, or a mapping of kinds to what is theirs; None of nothing."""
+    if "" in found and len(found) > 1:
+        raise ArgumentError(f"{option}: one without a kind stands alone, for all")
+    return found.get("", found or None)
+
+
+def _box(machine: Robot | SerialArm, given: Sequence[str]) -> Box:
+    """Ends of coordinates, mm and rad, as ``--within`` states them.
+
+    Raises
+    ------
+    ValueError
+        No such coordinate, no numbers.
+    """
+    if isinstance(machine, SerialArm):
+        units = {f"q{i + 1}": unit for i, unit in enumerate(machine.actuator_units)}
+    else:
+        units = COORDINATE_UNITS
+    box = {}
+    for text in (part.strip() for each in given for part in each.split(",")):
+        name, _, ends = text.partition("=")
+        low, _, high = ends.partition(":")
+        if name.strip() not in units:
+            known = did_you_mean(name.strip(), units)
+            raise ArgumentError(f"--within {text}: {name.strip()!r} is no coordinate{known}")
+        try:
+            numbers = typed(low), typed(high)
+        except ValueError:
+            raise ArgumentError(f"--within {text}: expected NAME=LO:HI, such as z=0:300") from None
+        if not numbers[0] < numbers[1]:
+            raise ArgumentError(f"--within {text}: from {low.strip()} to {high.strip()} is nothing")
+        factor = np.radians(1.0) if units[name.strip()] == "rad" else 1.0
+        box[name.strip()] = (numbers[0] * factor, numbers[1] * factor)
+    return box
+
+
+def _drawn(machine: Robot | SerialArm, box: Box, seed: int) -> FloatArray:
+    if not isinstance(machine, SerialArm):
+        return sample_poses(machine, DRAWN, seed, share=_SHARE)
+    ends = machine.limits()
+    for name, (low, high) in box.items():
+        i = int(name[1:]) - 1
+        ends[i] = max(low, ends[i, 0]), min(high, ends[i, 1])
+    unknown = [f"q{i + 1}" for i in np.flatnonzero(~np.isfinite(ends).all(axis=1))]
+    if unknown:
+        raise ArgumentError(
+            f"--poses: {machine.name} is a serial arm, and the limits of {', '.join(unknown)} are"
+            f" not known: state them ('--within {unknown[0]}=-90:90'), or give a file of joint"
+            " coordinates to choose from, with columns such as 'q1 [deg]'"
+        )
+    return np.random.default_rng(seed).uniform(ends[:, 0], ends[:, 1], (DRAWN, len(ends)))
+
+
+def _places(machine: Robot | SerialArm, path: PathLike[str]) -> FloatArray:
+    """Poses of a file, or an arm's joint coordinates."""
+    if isinstance(machine, SerialArm):
+        return read_commands(path, machine.actuator_units)
+    return read_poses(path, machine)
+
+
+def write(made: Plan, out: Path, head: str) -> None:
+    """Write the files of a plan."""
+    kinds = list(dict.fromkeys(made.kinds))
+    several = {"kind": made.kinds} if len(kinds) > 1 else {}
+    carried = {} if made.load is None else {"payload [kg]": np.asarray(made.load.mass)}
+    write_poses(out / "poses.csv", made.poses, {**several, **carried}, comment=head)
+    for kind in kinds:
+        points = made.target.get(kind, np.empty((1, 0)))
+        own = np.array(made.kinds) == kind
+        mine = made.actuators[own]
+        at = np.tile(points, (len(mine), 1))
+        write_commands(
+            out / (f"commands-{kind}.csv" if several else "commands.csv"),
+            reading_units(made.robot),
+            np.repeat(mine, len(points), axis=0),
+            {f"target.{axis} [mm]": place for axis, place in zip("xyz", at.T, strict=False)}
+            | {name: np.repeat(kg[own], len(points)) for name, kg in carried.items()},
+            comment=head,
+        )
+
+
+def _effects(given: Sequence[str]) -> list[Any]:
+    """The effects that the calibration is to find as well."""
+    read = read_effects(given)
+    if isinstance(read, str):
+        raise ArgumentError(f"{OPTION}: {AUTO} is decided by rows, which a plan has not yet")
+    return read

@@ -1,26 +1,26 @@
 """A project file: what a window or a folder asks for, as plain TOML.
 
 It says what the options of the verbs say, in tables: ``machine``, ``measured`` and ``fit`` of a
-calibration, ``plan`` of a plan, ``import`` and ``export`` of configurations.
+calibration, ``plan`` of poses to measure, ``import`` of the configuration that the machine is made
+of, ``export`` with the controllers that it is written for.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NoReturn
 
 from pkmcal.exceptions import FileError
 from pkmcal.jobs.calibration import Calibration
-from pkmcal.jobs.importing import Importing
-from pkmcal.jobs.planning import Planning
-from pkmcal.jobs.stated import Refuse, refused
+from pkmcal.jobs.configuration import Importing
+from pkmcal.jobs.plan import Planning
+from pkmcal.jobs.stated import Refuse, of, refused
 
 VERSION = 1
 _VERSION = "pkmcal-project"
-_CALIBRATION = ("machine", "measured", "fit")
-_OTHERS = ("import", "plan", "export")
+_TABLES = ("machine", "measured", "fit", "plan", "import", "export")
 _ESCAPES = {'"': '\\"', "\\": "\\\\", "\n": "\\n", "\t": "\\t", "\r": "\\r"}
 
 
@@ -32,12 +32,12 @@ class Project:
     ----------
     calibration : Calibration
         The tables machine, measured and fit.
+    plan : Planning
+        The table plan; its machine is that of the calibration.
     importing : Importing or None
         The table import: of which configuration the machine is made.
-    planning : Planning
-        The table plan.
     targets : tuple of str
-        What the calibrated machine is exported for, beside its firmware: `as` of the table export.
+        What the calibrated machine is written for: `as` of the table export.
 
     Examples
     --------
@@ -58,19 +58,24 @@ class Project:
     """
 
     calibration: Calibration = field(default=Calibration())
+    plan: Planning = field(default=Planning())
     importing: Importing | None = None
-    planning: Planning = field(default=Planning())
     targets: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "plan", replace(self.plan, robot=self.calibration.robot))
 
     def table(self) -> dict[str, Any]:
         """What the file says, in plain values."""
-        others = {
-            "import": self.importing.table() if self.importing else {},
-            "plan": self.planning.table(),
-            "export": {"as": list(self.targets)} if self.targets else {},
+        importing = {} if self.importing is None else self.importing.table()
+        targets = {"export": {"as": list(self.targets)}} if self.targets else {}
+        return {
+            _VERSION: VERSION,
+            **self.calibration.table(),
+            **self.plan.table(),
+            **importing,
+            **targets,
         }
-        stated = {name: part for name, part in others.items() if part}
-        return {_VERSION: VERSION, **self.calibration.table(), **stated}
 
     @classmethod
     def of_table(cls, table: Mapping[str, Any], refuse: Refuse | None = None) -> Project:
@@ -86,20 +91,16 @@ class Project:
         if version != VERSION or isinstance(version, bool):
             refuse(_VERSION, f"must be {VERSION}, the version of project files, found {version!r}")
         for key in table:
-            if key not in (_VERSION, *_CALIBRATION, *_OTHERS):
+            if key not in (_VERSION, *_TABLES):
                 refuse(key, f"unknown key {key!r} of a project")
-        parts = {name: _part(table, name, refuse) for name in _OTHERS}
-        importing = Importing.of_table(parts["import"], _within("import", refuse))
-        if parts["import"] and importing.file is None:
-            refuse("import", "file is missing: the configuration")
-        targets = parts["export"].get("as", [])
-        if set(parts["export"]) - {"as"} or not _texts(targets):
-            refuse("export", f"must be as = [TARGET, …], found {parts['export']!r}")
+        targets, refuse_target = of(table, "export", refuse)
+        if targets.keys() - {"as"} or not _texts(targets.get("as", [])):
+            refuse_target("as", f"must be a list of controllers alone, found {dict(targets)!r}")
         return cls(
             Calibration.of_table(table, refuse),
-            importing if parts["import"] else None,
-            Planning.of_table(parts["plan"], _within("plan", refuse)),
-            tuple(targets),
+            Planning.of_table(table, refuse),
+            Importing.of_table(table, refuse) if "import" in table else None,
+            tuple(targets.get("as", [])),
         )
 
     def text(self) -> str:
@@ -127,23 +128,12 @@ class Project:
 
         return cls.of_table(source.data, refuse)
 
-    def within(self, folder: str | Path) -> Project:
+    def in_folder(self, folder: str | Path) -> Project:
         """The same with its relative paths below a folder."""
-        path = str(folder)
-        importing = self.importing.within(path) if self.importing else None
-        planning = self.planning.within(path)
-        return Project(self.calibration.within(path), importing, planning, self.targets)
-
-
-def _within(name: str, refuse: Refuse) -> Refuse:
-    return lambda key, why: refuse(f"{name}.{key}", why)
-
-
-def _part(table: Mapping[str, Any], name: str, refuse: Refuse) -> Mapping[str, Any]:
-    part = table.get(name, {})
-    if not isinstance(part, Mapping):
-        refuse(name, f"must be a table, found {part!r}")
-    return part
+        folder = str(folder)
+        importing = None if self.importing is None else self.importing.in_folder(folder)
+        calibration, plan = self.calibration.in_folder(folder), self.plan.in_folder(folder)
+        return Project(calibration, plan, importing, self.targets)
 
 
 def _texts(value: object) -> bool:

@@ -86,9 +86,9 @@ class Reading(Stated):
             table = {**table, "rename": [f"{old}={new}" for old, new in names.items()]}
         return super().values_of_table(table, refuse)
 
-    def within(self, folder: str) -> Reading:
+    def in_folder(self, folder: str) -> Reading:
         """The same with its relative paths below a folder."""
-        found = super().within(folder)
+        found = super().in_folder(folder)
         if self.board is None or not self.board.lower().endswith(".csv"):
             return found
         return replace(found, board=below(folder, self.board))

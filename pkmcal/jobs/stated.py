@@ -100,7 +100,7 @@ class Stated:
             for key, value in table.items()
         }
 
-    def within(self: S, folder: str) -> S:
+    def in_folder(self: S, folder: str) -> S:
         """The same with its relative paths below a folder."""
         changed = {}
         for each in fields(self):  # type: ignore[arg-type]
@@ -116,6 +116,14 @@ class Stated:
 def refused(key: str, why: str) -> NoReturn:
     """Refuse a value of a table that is in no file."""
     raise ArgumentError(why if repr(key) in why else f"{key}: {why}")
+
+
+def of(table: Mapping[str, Any], name: str, refuse: Refuse) -> tuple[Mapping[str, Any], Refuse]:
+    """A table within a table, empty if it is not there, and what refuses its keys."""
+    found = table.get(name, {})
+    if not isinstance(found, Mapping):
+        refuse(name, f"must be a table, found {found!r}")
+    return found, lambda key, why: refuse(f"{name}.{key}", why)
 
 
 def below(folder: str, path: str) -> str:

@@ -23,30 +23,11 @@ from pkmcal.jobs.project import Project
 from pkmcal.jobs.reading import Reading
 from pkmcal.jobs.stated import Stated
 
+from .states import RENAMED, TEXT, said_by, states
+
 ROOT = Path(__file__).resolve().parents[2]
 DELTA = ROOT / "examples" / "linear-delta"
 ROBOT, PROBE = str(DELTA / "robot.toml"), str(DELTA / "probe.csv")
-
-# Letters that shells, TOML, command lines and paths each take for something.
-LETTERS = st.sampled_from("ab-'\"\\ $*;#=,:[]{}\n\té±σ\x7f\u200b𝔸1.@/")
-TEXT = st.text(LETTERS, min_size=1, max_size=8)
-HEADING = st.text(LETTERS.filter(lambda each: each != "="), min_size=1, max_size=6).filter(
-    lambda text: text == text.strip()
-)
-RENAMED = st.builds("{}={}".format, HEADING, TEXT.filter(lambda text: text == text.strip()))
-OF_KIND: dict[str, st.SearchStrategy[Any]] = {
-    "bool": st.booleans(),
-    "str": TEXT,
-    "str | None": st.none() | TEXT,
-    "PathText | None": st.none() | TEXT,
-    "tuple[str, ...]": st.lists(TEXT, max_size=3),
-}
-
-
-def states(of: type[Stated], **own: st.SearchStrategy[Any]) -> st.SearchStrategy[Any]:
-    parts = {each.name: OF_KIND.get(str(each.type)) for each in fields(of)} | own  # type: ignore[arg-type]
-    return st.builds(of, **parts)
-
 
 CALIBRATIONS = states(
     Calibration,
@@ -57,20 +38,11 @@ CALIBRATIONS = states(
 WRITINGS = states(Writing)
 
 
-def parsed(run: Any, argv: list[str]) -> tuple[Calibration, Writing]:
-    """What the verb makes of a command line."""
-    seen: list[tuple[Calibration, Writing]] = []
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(calibrate, "carried_out", lambda job, asked, json: seen.append((job, asked)))
-        result = run(*argv)
-    assert seen, result.output
-    return seen[0]
-
-
 def round_trip(run: Any, job: Calibration, asked: Writing) -> None:
     program, verb, *words = job.argv()
     assert (program, verb) == ("pkmcal", "calibrate")
-    assert parsed(run, [verb, *asked.options(), *words]) == (job, asked)
+    argv = [verb, *asked.options(), *words]
+    assert said_by(run, calibrate, "carried_out", Stated, argv) == [job, asked]
 
 
 @given(CALIBRATIONS, WRITINGS)
@@ -210,7 +182,7 @@ import sys
 from pkmcal.jobs.project import Project
 from pkmcal.jobs.calibration import Calibration, Writing
 job = Calibration("hexapod", ("a.csv",), holdout="b.csv", free=("default",))
-project = Project(job).within("folder")
+project = Project(job).in_folder("folder")
 assert Project.of_table(project.table()) == project
 assert project.calibration.argv() and Writing(report="x").options() and project.text()
 found = {"numpy", "scipy", "typer"} & set(sys.modules)

@@ -31,9 +31,9 @@ export async function machine(main) {
     made('h2', said, { text: found.name })
     for (const note of found.notes) made('p', said, { className: 'note', text: note })
     for (const { what, suggestion } of found.findings) made('p', said, { className: 'warn', text: `${what}: ${suggestion}` })
-    if (found.stored)
-      button(said, 'Calibrate with the stored heights', async () => {
-        await change(table => { table.measured = { files: [found.stored] } }) && await go('result')
+    if (found.stored.length)
+      button(said, 'Calibrate with what it has stored', async () => {
+        await change(table => { table.measured = { files: found.stored } }) && await go('result')
       }, { className: 'first' })
     button(said, 'Plan a measurement', () => go('plan'))
     button(said, 'I have measurements', () => go('measure'))

@@ -1,0 +1,40 @@
+"""The machine of a job: a built-in one by its name, or a robot file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib import resources
+from typing import Any
+
+from pkmcal.jobs.stated import Refuse, below
+
+
+def machine_table(robot: str) -> dict[str, str]:
+    """The table of a machine: the built-in one of this name, or a file."""
+    return {"builtin" if is_built_in(robot) else "file": robot} if robot else {}
+
+
+def machine_of_table(table: Mapping[str, Any], refuse: Refuse) -> str:
+    """What the table of a machine says: the name of a built-in machine, or a file; or nothing."""
+    for key, value in table.items():
+        if key not in ("builtin", "file"):
+            refuse(key, f"unknown key {key!r} of [machine]; it has builtin or file")
+        if not isinstance(value, str) or not value:
+            refuse(key, f"must be a text, found {value!r}")
+        if len(table) > 1:
+            refuse(key, "a machine is built-in or a file, not both")
+        if key == "builtin" and not is_built_in(value):
+            refuse(key, f"{value!r} is no built-in machine")
+    return next(iter(table.values()), "")
+
+
+def is_built_in(robot: str) -> bool:
+    """Whether this is the name of a built-in machine."""
+    folders = resources.files("pkmcal") / "builtin"
+    files = (folders / kind / f"{robot}.toml" for kind in ("machines", "arms"))
+    return not {"/", "\\", "\0"} & set(robot) and any(file.is_file() for file in files)
+
+
+def in_folder(robot: str, folder: str) -> str:
+    """The machine, its file below a folder where it is relative."""
+    return robot if not robot or is_built_in(robot) else below(folder, robot)
