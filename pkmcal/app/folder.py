@@ -20,7 +20,7 @@ from pkmcal.jobs.project import Project
 if sys.version_info >= (3, 11):
     import tomllib
 else:
-    import tomli as tomllib
+    import tomli as tomllib  # type: ignore[import-not-found,unused-ignore]
 
 FILE = "project.toml"
 OWN = (FILE, "robot.toml", "commands.csv")  # names that are pkmcal's; a user's file gets another

@@ -181,7 +181,8 @@ class Server:
         try:
             yield _line({"job": job})
             while True:
-                await asyncio.wait({following, stop}, return_when=asyncio.FIRST_COMPLETED)
+                tasks: set[asyncio.Future[Any]] = {following, stop}
+                await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
                 if not following.done():
                     await _ended(following)
                     yield _line({"error": {"message": "stopped", "stopped": True}})
