@@ -132,7 +132,9 @@ def look(work: Work, state: Table, given: Table, say: Say) -> Table:
     measured = sources.measured
     return {
         **found,
-        "notes": [*work.notes, *(note for each in measured for note in each.notes)],
+        "notes": list(
+            dict.fromkeys([*work.notes, *(note for each in measured for note in each.notes)])
+        ),
         "text": [str(each) for each in measured],
         "rows": sum(map(len, measured)),
     }

@@ -43,9 +43,11 @@ def served(folder: Path) -> Iterator[Served]:
         " testing=True)"
     )
     with subprocess.Popen(
-        [sys.executable, "-c", code, str(folder)], stdout=subprocess.PIPE, text=True,
+        [sys.executable, "-c", code, str(folder)],
+        stdout=subprocess.PIPE,
+        text=True,
         env={**os.environ, "PYTHONUNBUFFERED": "1"},
-    ) as process:  # fmt: skip
+    ) as process:
         try:
             assert process.stdout is not None
             process.stdout.readline()
@@ -57,7 +59,7 @@ def served(folder: Path) -> Iterator[Served]:
 
 @contextmanager
 def page_of(served: Served, **context: Any) -> Iterator[Any]:
-    """Open the page in Chromium; nothing may be asked of others, and nothing said on the console."""
+    """Open the page in Chromium; no other host is asked, and nothing is said on the console."""
     api = pytest.importorskip("playwright.sync_api", reason="no Playwright: make test-app")
     if CHROMIUM is None:
         pytest.skip("no Chromium here: make test-app")

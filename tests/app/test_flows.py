@@ -72,8 +72,12 @@ def test_a_printers_owner_gets_the_configuration_that_the_commands_write(tmp_pat
         new = Path(taken.value.path()).read_bytes()
         assert "position_endstop" in page.locator("pre.diff").inner_text()
         shoot(page, "out")
-        lines = [each for step in ("1 Machine", "4 Result", "5 Take away") for each in commands(page, step)
-                 if each[1] != "show"]  # fmt: skip
+        lines = [
+            each
+            for step in ("1 Machine", "4 Result", "5 Take away")
+            for each in commands(page, step)
+            if each[1] != "show"
+        ]
     by_hand.mkdir()
     shutil.copy(PRINTER, by_hand)
     for argv in lines:
@@ -85,7 +89,7 @@ def test_a_printers_owner_gets_the_configuration_that_the_commands_write(tmp_pat
 
 @pytest.fixture(scope="module")
 def tracked(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A tracker's points in a frame of its own and the controller's log, two rows of 90 mistaken."""
+    """A tracker's points and the controller's log, two rows of 90 mistaken."""
     folder = tmp_path_factory.mktemp("tracked")
     robot = pk.load("hexapod")
     rng = np.random.default_rng(3)
@@ -128,7 +132,8 @@ def test_a_metrologist_leaves_bad_rows_out_and_gets_what_the_command_says(
         page.get_by_role("button", name="show row 3", exact=True).click()
         assert page.evaluate("workbench.picture.machine.calibration.named.row") == 3
         at = page.evaluate(
-            "(() => { const { scene, calibration } = workbench.picture.machine, p = calibration.points[40],"
+            "(() => { const { scene, calibration } = workbench.picture.machine,"
+            " p = calibration.points[40],"
             " [x, y] = scene.seen(scene.eye, p.at), r = scene.canvas.getBoundingClientRect();"
             " return [r.x + x, r.y + y] })()"
         )

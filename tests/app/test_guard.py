@@ -43,9 +43,13 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[browser.Served]
 
 
 def ask(
-    served: browser.Served, method: str, path: str, body: bytes | None = None,
-    headers: dict[str, str] | None = None, token: bool = True,
-) -> tuple[int, dict[str, str], bytes]:  # fmt: skip
+    served: browser.Served,
+    method: str,
+    path: str,
+    body: bytes | None = None,
+    headers: dict[str, str] | None = None,
+    token: bool = True,
+) -> tuple[int, dict[str, str], bytes]:
     connection = http.client.HTTPConnection("127.0.0.1", served.port, timeout=20)
     given = {"x-pkmcal-token": served.token} if token else {}
     connection.request(method, path, body, {**given, **(headers or {})})
@@ -88,10 +92,21 @@ def test_a_token_in_the_address_or_in_a_cookie_is_none(served: browser.Served) -
     assert ask(served, "GET", "/api/state", headers=cookie, token=False)[0] == 401
 
 
-@pytest.mark.parametrize("host", [
-    "evil.example", "127.0.0.1", "localhost", "127.0.0.1:1", "[::1]:80", "0.0.0.0", "127.0.0.1.evil.example",
-    "", "evil.example:{port}", "127.0.0.2:{port}",
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "host",
+    [
+        "evil.example",
+        "127.0.0.1",
+        "localhost",
+        "127.0.0.1:1",
+        "[::1]:80",
+        "0.0.0.0",
+        "127.0.0.1.evil.example",
+        "",
+        "evil.example:{port}",
+        "127.0.0.2:{port}",
+    ],
+)
 def test_a_name_that_was_made_to_lead_here_is_refused(served: browser.Served, host: str) -> None:
     assert (
         ask(served, "GET", "/api/state", headers={"Host": host.format(port=served.port)})[0] == 421
@@ -107,10 +122,17 @@ def test_two_hosts_are_refused(served: browser.Served) -> None:
         assert connection.recv(100).split()[1] in (b"400", b"421")
 
 
-@pytest.mark.parametrize("headers", [
-    {"Origin": "http://evil.example"}, {"Origin": "null"}, {"Origin": "http://127.0.0.1:1"},
-    {"Origin": "https://localhost"}, {"Sec-Fetch-Site": "cross-site"}, {"Sec-Fetch-Site": "same-site"},
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {"Origin": "http://evil.example"},
+        {"Origin": "null"},
+        {"Origin": "http://127.0.0.1:1"},
+        {"Origin": "https://localhost"},
+        {"Sec-Fetch-Site": "cross-site"},
+        {"Sec-Fetch-Site": "same-site"},
+    ],
+)
 def test_another_origin_is_refused_even_with_the_token(
     served: browser.Served, headers: dict[str, str]
 ) -> None:
@@ -118,10 +140,23 @@ def test_another_origin_is_refused_even_with_the_token(
         assert ask(served, method, path, b"{}", headers)[0] == 403
 
 
-@pytest.mark.parametrize("path", [
-    "/etc/passwd", "..%2f..%2fetc%2fpasswd", "%2e%2e/x", "link", ".hidden", "mine.csv%00", "%00", "mine.csv/",
-    "a/../../x", "....//x", "%5c..%5cx", "",
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/etc/passwd",
+        "..%2f..%2fetc%2fpasswd",
+        "%2e%2e/x",
+        "link",
+        ".hidden",
+        "mine.csv%00",
+        "%00",
+        "mine.csv/",
+        "a/../../x",
+        "....//x",
+        "%5c..%5cx",
+        "",
+    ],
+)
 def test_no_way_leads_out_of_the_folder(served: browser.Served, path: str) -> None:
     status, _, body = ask(served, "GET", f"/api/download/{path}")
     assert status in (200, 307, 404) and b"root:" not in body and b"secret" not in body
@@ -171,8 +206,19 @@ def test_half_a_file_leaves_nothing(served: browser.Served) -> None:
     assert not (served.folder / "half.csv").exists() and not list(served.folder.glob(".*.part"))
 
 
-@pytest.mark.parametrize("body", [b"", b"{", b"[" * 100_000, b"[]", b"null", b'{"state": 1, "version": 1}', b"\xff",
-                                  b'{"state": {"pkmcal-project": 1, "machine": {"file": "/etc/passwd"}}, "version": 1}'])  # fmt: skip
+@pytest.mark.parametrize(
+    "body",
+    [
+        b"",
+        b"{",
+        b"[" * 100_000,
+        b"[]",
+        b"null",
+        b'{"state": 1, "version": 1}',
+        b"\xff",
+        b'{"state": {"pkmcal-project": 1, "machine": {"file": "/etc/passwd"}}, "version": 1}',
+    ],
+)
 def test_a_broken_state_is_refused_and_nothing_changes(served: browser.Served, body: bytes) -> None:
     before = state(served)
     assert ask(served, "POST", "/api/state", body)[0] in (400, 409)
@@ -195,8 +241,9 @@ def test_of_two_tabs_the_second_is_told(served: browser.Served) -> None:
 
 
 def test_only_this_computer_is_listened_to(served: browser.Served) -> None:
-    listening = subprocess.run(["ss", "-ltnH", f"sport = :{served.port}"], capture_output=True,
-                               text=True, check=True).stdout.split()  # fmt: skip
+    listening = subprocess.run(
+        ["ss", "-ltnH", f"sport = :{served.port}"], capture_output=True, text=True, check=True
+    ).stdout.split()
     assert listening[3] == f"127.0.0.1:{served.port}"
 
 

@@ -1,4 +1,4 @@
-"""Names of files that others chose: what is kept of them names a file of the folder, and no more."""
+"""Names of files that others chose: what is kept of them names a file of the folder alone."""
 
 from __future__ import annotations
 
@@ -13,10 +13,31 @@ from pkmcal.app.folder import Folder
 from pkmcal.app.names import safe_name
 
 HOSTILE = [
-    "../x.csv", "..\\x.csv", "/etc/passwd", "C:\\x.csv", "-rf", "--out", ".hidden", "a\nb.csv", "a\x00b.csv",
-    "x;rm -rf ~.csv", "$(x).csv", "`x`.csv", "con.txt", "LPT1", "a" * 300 + ".csv", "…", "\u202egnp.csv",
-    "\x1b[31m.csv", "<img src=x onerror=alert(1)>.csv", "é.csv", "e\u0301.csv", " ", "", "%2e%2e%2f",
-]  # fmt: skip
+    "../x.csv",
+    "..\\x.csv",
+    "/etc/passwd",
+    "C:\\x.csv",
+    "-rf",
+    "--out",
+    ".hidden",
+    "a\nb.csv",
+    "a\x00b.csv",
+    "x;rm -rf ~.csv",
+    "$(x).csv",
+    "`x`.csv",
+    "con.txt",
+    "LPT1",
+    "a" * 300 + ".csv",
+    "…",
+    "\u202egnp.csv",
+    "\x1b[31m.csv",
+    "<img src=x onerror=alert(1)>.csv",
+    "é.csv",
+    "e\u0301.csv",
+    " ",
+    "",
+    "%2e%2e%2f",
+]
 
 
 @pytest.mark.parametrize("name", HOSTILE)
@@ -78,20 +99,28 @@ def test_a_change_of_an_old_version_is_not_taken_and_undo_goes_back(tmp_path: Pa
     assert not folder.undoable
 
 
-@pytest.mark.parametrize("table", [
-    {"pkmcal-project": 1, "machine": {"file": "/etc/passwd"}},
-    {"pkmcal-project": 1, "machine": {"file": "../x.toml"}},
-    {"pkmcal-project": 1, "measured": {"files": ["missing.csv"]}},
-    {"pkmcal-project": 1, "machine": {"builtin": "hexapod"}, "fit": {"holdout": "/etc/passwd"}},
-    {"pkmcal-project": 1, "import": {"file": "/etc/passwd", "out": "machine"}},
-    {"pkmcal-project": 1, "import": {"file": "mine.cfg", "out": "../elsewhere"}},
-    {"pkmcal-project": 1, "import": {"file": "mine.cfg", "out": "."}},
-    {"pkmcal-project": 1, "import": {"file": "mine.cfg", "out": "machine", "log": "/etc/passwd"}},
-    {"pkmcal-project": 1, "machine": {"builtin": "hexapod"}, "plan": {"out": "/tmp/elsewhere"}},
-    {"pkmcal-project": 1, "measured": {"board": "../points.csv"}},
-    {"pkmcal-project": 1, "measured": {"files": [], "controller": "../../x"}},
-    {"pkmcal-project": 2}, {"pkmcal-project": 1, "shell": "rm"}, {},
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "table",
+    [
+        {"pkmcal-project": 1, "machine": {"file": "/etc/passwd"}},
+        {"pkmcal-project": 1, "machine": {"file": "../x.toml"}},
+        {"pkmcal-project": 1, "measured": {"files": ["missing.csv"]}},
+        {"pkmcal-project": 1, "machine": {"builtin": "hexapod"}, "fit": {"holdout": "/etc/passwd"}},
+        {"pkmcal-project": 1, "import": {"file": "/etc/passwd", "out": "machine"}},
+        {"pkmcal-project": 1, "import": {"file": "mine.cfg", "out": "../elsewhere"}},
+        {"pkmcal-project": 1, "import": {"file": "mine.cfg", "out": "."}},
+        {
+            "pkmcal-project": 1,
+            "import": {"file": "mine.cfg", "out": "machine", "log": "/etc/passwd"},
+        },
+        {"pkmcal-project": 1, "machine": {"builtin": "hexapod"}, "plan": {"out": "/tmp/elsewhere"}},
+        {"pkmcal-project": 1, "measured": {"board": "../points.csv"}},
+        {"pkmcal-project": 1, "measured": {"files": [], "controller": "../../x"}},
+        {"pkmcal-project": 2},
+        {"pkmcal-project": 1, "shell": "rm"},
+        {},
+    ],
+)
 def test_a_state_of_files_elsewhere_or_of_unknown_keys_is_refused(
     tmp_path: Path, table: dict
 ) -> None:

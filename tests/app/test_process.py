@@ -86,8 +86,11 @@ def test_a_tab_that_is_closed_ends_its_work(tmp_path: Path) -> None:
 def test_an_error_of_the_users_is_in_words_with_file_and_line(tmp_path: Path) -> None:
     with browser.served(tmp_path / "project") as served:
         ask(served, "PUT", "/api/file/broken.csv", b"q1 [mm],x [mm]\n1,2\n3,abc\n")
-        table = {"pkmcal-project": 1, "machine": {"builtin": "hexapod"},
-                 "measured": {"files": ["broken.csv"]}}  # fmt: skip
+        table = {
+            "pkmcal-project": 1,
+            "machine": {"builtin": "hexapod"},
+            "measured": {"files": ["broken.csv"]},
+        }
         body = json.dumps({"state": table, "version": 1}).encode()
         assert ask(served, "POST", "/api/state", body)[0] == 200
         found = lines(served, "look")[-1]["result"]
