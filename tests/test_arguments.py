@@ -42,6 +42,7 @@ WRONG: dict[str, list[Any]] = {
     "measurements": [None, 3, "abc", [3], [None]],
     "identification": [None, 3, ROBOT],
     "path": [None, 3, 2.5, ["abc"], object()],
+    "files": [None, 3, 2.5, object(), [3], [None]],
     "comment": [3, ["# abc"], "abc", "# abc\nabc"],
     "function": [3, "abc", [abs]],
     "executor": [0, 3, "threads", ThreadPoolExecutor],
@@ -68,12 +69,12 @@ CALLS: dict[str, Call] = {
     "detect": (
         pk.detect,
         {"images": "pictures", "board": BOARD},
-        {"images": "path", "board": "robot", "camera": "robot", "progress": "function"},
+        {"images": "files", "board": "robot", "camera": "robot", "progress": "function"},
     ),
     "print_board": (
         pk.print_board,
         {"board": BOARD, "path": "board.pdf"},
-        {"board": "robot", "path": "path", "margin": "count"},
+        {"board": "robot", "path": "path", "margin": "number"},
     ),
     "circular_test": (
         pk.circular_test,

@@ -50,8 +50,9 @@ def plan(
         str,
         typer.Option(
             metavar="KIND",
-            help="What is measured: position, pose, height, distance, orientation, closure or pixel"
-            " (pictures of a board). Of several how many poses of each: position=20,distance=10.",
+            help="What is measured: position, pose, height, distance, orientation, closure, pixel"
+            " (pictures of a board) or probe (a printer's own, on its bed). Of several how many"
+            " poses of each: position=20,distance=10.",
         ),
     ] = "position",
     target: Annotated[

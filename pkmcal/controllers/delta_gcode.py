@@ -38,7 +38,7 @@ from pkmcal.controllers.gcode_words import (
     require_positive,
     settings,
 )
-from pkmcal.controllers.linear_delta import FirmwareDelta, of_robot
+from pkmcal.controllers.linear_delta import Bed, FirmwareDelta, of_robot
 from pkmcal.controllers.loss import Loss
 from pkmcal.controllers.reprap_files import own_config
 from pkmcal.controllers.rotary_delta import is_rotary_delta
@@ -184,6 +184,22 @@ def of_reprap(text: str, place: str = "M665") -> FirmwareDelta:
     height = number(size, "H", "M665", place)
     ats = [height + number(ends, letter, "M666", place, 0.0) for letter in "XYZ"]
     return _delta(size, radius, arms, ats, place)
+
+
+def reprap_bed(text: str, place: str) -> Bed:
+    """Where RepRapFirmware lets the nozzle go: within B of M665, where that states it.
+
+    Raises
+    ------
+    ValueError
+        A radius that is none.
+    """
+    size = settings(text, "M665", place)
+    if "B" not in size:
+        return Bed()
+    radius = number(size, "B", "M665", place)
+    require_positive([radius], "B", "M665", place)
+    return Bed(radius)
 
 
 def of_marlin(text: str, place: str = "M665") -> FirmwareDelta:

@@ -11,9 +11,16 @@ from typing import get_args
 from pkmcal.arguments import path as as_path
 from pkmcal.arguments import word
 from pkmcal.controllers import hangprinter, linear_delta, maslow, rotary_delta, rotary_gcode
-from pkmcal.controllers.delta_gcode import marlin_probe, of_marlin, of_reprap, reprap_probe
+from pkmcal.controllers.delta_gcode import (
+    marlin_probe,
+    of_marlin,
+    of_reprap,
+    reprap_bed,
+    reprap_probe,
+)
 from pkmcal.controllers.firmwares import Firmware, firmware_of
 from pkmcal.controllers.klipper_import import of_klipper
+from pkmcal.controllers.linear_delta import Bed
 from pkmcal.controllers.reprap_files import running
 from pkmcal.controllers.robot_files import About, robot_of
 from pkmcal.controllers.stored import Stored
@@ -186,7 +193,7 @@ def _of_marlin(path: str | PathLike[str]) -> Stored:
     where, text = as_path("path", path), text_in(path, "replace")  # of comments
     delta, probe = of_marlin(text, str(where)), marlin_probe(text, str(where))
     about = _about(where, _GCODE_HEAD, "marlin", probe=probe)
-    return Stored(linear_delta.text_of(delta, _DOWN, about, bed=True))
+    return Stored(linear_delta.text_of(delta, _DOWN, about, bed=Bed()))
 
 
 def _of_reprap(path: str | PathLike[str]) -> Stored:
@@ -204,7 +211,8 @@ def _of_reprap(path: str | PathLike[str]) -> Stored:
         robot = rotary_delta.text_of(crank, round(0.5 * max(crank.endstops), 3), about)
     else:
         about = _about(where, _GCODE_HEAD, "reprap", config, probe)
-        robot = linear_delta.text_of(of_reprap(text, place), _DOWN, about, bed=True)
+        delta, bed = of_reprap(text, place), reprap_bed(text, place)
+        robot = linear_delta.text_of(delta, _DOWN, about, bed=bed)
     return Stored(robot, notes=notes)
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from pkmcal.controllers import linear_delta, rotary_delta
-from pkmcal.controllers.linear_delta import FirmwareDelta
+from pkmcal.controllers.linear_delta import Bed, FirmwareDelta
 from pkmcal.controllers.printer_config import (
     ANGLES,
     STEPPERS,
@@ -66,7 +66,7 @@ def of_klipper(path: str | PathLike[str]) -> Stored:
         delta, steps = _linear(printer)
         about = About(where.stem, _LINEAR_HEAD.format(file=where.name), probe, controller)
         rods = heights is not None and distances is not None
-        text = linear_delta.text_of(delta, steps, about, bed=True, rods=rods)
+        text = linear_delta.text_of(delta, steps, about, bed=_bed(printer), rods=rods)
     return Stored(text, heights, distances, (*notes, *unread))
 
 
@@ -84,6 +84,15 @@ def _linear(printer: PrinterConfig) -> tuple[FirmwareDelta, list[float]]:
         carriages.append(_first(printer, section, "position_endstop") + height)
         steps.append(-step_of(printer, section))
     return FirmwareDelta(radius, tuple(angles), tuple(arms), tuple(carriages)), steps
+
+
+def _bed(printer: PrinterConfig) -> Bed:
+    """Where the nozzle goes: within the print radius, or else where DELTA_CALIBRATE probes."""
+    radius = None
+    for section, option in (("printer", "print_radius"), (_CALIBRATE, "radius")):
+        if radius is None and printer.has(section, option):
+            radius = positive(printer, section, option)
+    return Bed(radius, printer.number("printer", "minimum_z_position", 0.0))
 
 
 def _rotary(printer: PrinterConfig) -> RotaryDelta:

@@ -57,6 +57,31 @@ class FirmwareDelta:
         return tuple(at - float(np.sqrt(arm**2 - self.radius**2)) for at, arm in pairs)
 
 
+@dataclass(frozen=True)
+class Bed:
+    """Where a firmware lets the nozzle go.
+
+    Attributes
+    ----------
+    radius : float or None
+        How far from the middle, mm; None where the firmware's file does not state it.
+    lowest : float
+        The least height, mm.
+    """
+
+    radius: float | None = None
+    lowest: float = 0.0
+
+
+def _box(firmware: FirmwareDelta, bed: Bed) -> dict[str, list[float]]:
+    """The workspace: between the towers, over the bed and below the end stops."""
+    across, high = round(firmware.radius, 3), round(min(firmware.endstops), 3)
+    if across <= 0.0 or high <= max(0.0, bed.lowest):
+        return {}
+    box = {"x": [-across, across], "y": [-across, across], "z": [bed.lowest, high]}
+    return box if bed.radius is None else box | {"radius": [0.0, bed.radius]}
+
+
 def of_robot(robot: Robot, project: bool) -> tuple[FirmwareDelta, Loss]:
     """The firmware's numbers of a robot, and what they lose.
 
@@ -154,7 +179,7 @@ def text_of(
     firmware: FirmwareDelta,
     gains: Sequence[float],
     about: About,
-    bed: bool = False,
+    bed: Bed | None = None,
     rods: bool = False,
 ) -> str:
     """A robot file with the firmware's numbers.
@@ -167,13 +192,13 @@ def text_of(
         Mm a carriage rises for a unit of its actuator, which is 0 at the end stop.
     about : About
         Its name and where it comes from.
-    bed : bool
-        Whether the nozzle stays between the towers, over the bed and below the end stops.
+    bed : Bed or None
+        Where the nozzle stays; carriages then stay below their end stops.
     rods : bool
         Whether a calibration frees the rods: where distances across the bed were measured.
     """
-    across, high = round(firmware.radius, 3), round(min(firmware.endstops), 3)
-    box = {"x": [-across, across], "y": [-across, across], "z": [0.0, high]}
+    box = {} if bed is None else _box(firmware, bed)
+    lowest = 0.0 if bed is None else min(0.0, bed.lowest)  # no carriage is below the nozzle
     parameters = {"radius": firmware.radius}
     parameters |= {f"angle{i}": angle for i, angle in enumerate(firmware.angles, 1)}
     limbs = [
@@ -187,6 +212,7 @@ def text_of(
             "gain": gain,
             "branch": -1,
         }
+        | ({"stroke": [lowest, carriage]} if bed is not None and carriage > lowest else {})
         for i, (arm, carriage, gain) in enumerate(
             zip(firmware.arms, firmware.carriages, gains, strict=True), 1
         )
@@ -198,5 +224,5 @@ def text_of(
         limbs,
         parameters,
         f"# Nothing determines which way x is, so angle3 stays{'' if rods else _HELD_RODS}.\n",
-        box if bed and across > 0 and high > 0 else None,
+        box,
     )

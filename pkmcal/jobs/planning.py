@@ -15,7 +15,7 @@ from pkmcal.arrays import FloatArray
 from pkmcal.core.library import COORDINATE_UNITS
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.number_text import typed
-from pkmcal.geometry.box import Box
+from pkmcal.geometry.box import RADIUS, Box
 from pkmcal.jobs.effects_option import AUTO, OPTION, read_effects
 from pkmcal.jobs.geometry_options import free_names, read_prior
 from pkmcal.jobs.inputs import Inputs
@@ -25,7 +25,7 @@ from pkmcal.jobs.planned_camera import planned_camera
 from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.kinematics.reading_units import reading_units
 from pkmcal.kinematics.robot import Robot
-from pkmcal.kinematics.workspace import sample_poses
+from pkmcal.kinematics.workspace import good_poses, sample_poses
 from pkmcal.loading import load
 from pkmcal.measurements.command_csv import read_commands, write_commands
 from pkmcal.measurements.pose_csv import read_poses, write_poses
@@ -34,6 +34,8 @@ from pkmcal.planning.plan_poses import PLANNED, Plan, plan_poses
 from pkmcal.planning.planned import UNKNOWN
 from pkmcal.readings.registry import Kind
 
+PROBE = "probe"  # of a printer: heights, on its bed
+_RINGS = 8  # of places on the bed
 DRAWN, _SHARE = 500, 0.9  # candidates where none are given, and how far out they reach
 
 
@@ -67,7 +69,7 @@ def run(job: Planning, machine: Robot | SerialArm, inputs: Inputs) -> Plan:
     payloads = [] if job.payloads is None else job.payloads.split(",")
     return plan_poses(
         machine,
-        _drawn(machine, box, job.seed) if places is None else places,
+        _candidates(job, machine, box) if places is None else places,
         count=30 if job.count is None and job.accuracy is None and not several else job.count,
         accuracy=job.accuracy,
         targets=used,
@@ -108,7 +110,7 @@ def kinds_of(job: Planning) -> Kind | dict[Kind, int]:
     ValueError
         No kind, or a number of poses beside those of each kind.
     """
-    kinds = _kinds(job.kind)
+    kinds = "height" if job.kind == PROBE else _kinds(job.kind)
     if isinstance(kinds, dict) and "pixel" in kinds:
         raise ArgumentError(f"--kind {job.kind}: pictures are planned by themselves")
     if isinstance(kinds, dict) and (job.count is not None or job.accuracy is not None):
@@ -186,7 +188,7 @@ def _box(machine: Robot | SerialArm, given: Sequence[str]) -> Box:
     if isinstance(machine, SerialArm):
         units = {f"q{i + 1}": unit for i, unit in enumerate(machine.actuator_units)}
     else:
-        units = COORDINATE_UNITS
+        units = {**COORDINATE_UNITS, RADIUS: "mm"}
     box = {}
     for text in (part.strip() for each in given for part in each.split(",")):
         name, _, ends = text.partition("=")
@@ -203,6 +205,38 @@ def _box(machine: Robot | SerialArm, given: Sequence[str]) -> Box:
         factor = np.radians(1.0) if units[name.strip()] == "rad" else 1.0
         box[name.strip()] = (numbers[0] * factor, numbers[1] * factor)
     return box
+
+
+def _candidates(job: Planning, machine: Robot | SerialArm, box: Box) -> FloatArray:
+    """Poses to choose from, where no file states them."""
+    return _on_bed(machine) if job.kind == PROBE else _drawn(machine, box, job.seed)
+
+
+def _on_bed(machine: Robot | SerialArm) -> FloatArray:
+    """Poses (N, 6) of a printer at z = 0 that it reaches: rings about the middle.
+
+    Raises
+    ------
+    ValueError
+        The robot file does not say how large the bed is, or nothing of it is reached.
+    """
+    stated = machine.model.workspace if isinstance(machine, Robot) else {}
+    ends = [stated[name][1] for name in ("radius", "x", "y") if name in stated]
+    if not isinstance(machine, Robot) or not ends:
+        raise ArgumentError(
+            "--kind probe: the robot file does not say how large the bed is: state it, --within"
+            " radius=0:100"
+        )
+    rings = [np.zeros((1, 2))]
+    for ring in range(1, _RINGS + 1):
+        turns = 2.0 * np.pi * np.arange(6 * ring) / (6 * ring)
+        rings.append(min(ends) * ring / _RINGS * np.stack([np.cos(turns), np.sin(turns)], axis=1))
+    poses = np.zeros((sum(map(len, rings)), 6))
+    poses[:, :2] = np.concatenate(rings)
+    reached: FloatArray = poses[good_poses(machine, poses)]
+    if not len(reached):
+        raise ArgumentError(f"--kind probe: {machine.name} reaches nothing of its bed at z = 0")
+    return reached
 
 
 def _drawn(machine: Robot | SerialArm, box: Box, seed: int) -> FloatArray:

@@ -257,7 +257,8 @@ def reach(robot: Robot) -> dict[str, tuple[float, float]]:
 def _middle(robot: Robot) -> FloatArray:
     """Home, with coordinates that the stated workspace leaves out in the middle of their range."""
     middle: FloatArray = robot.home.copy()
-    for name, (low, high) in robot.model.workspace.items():
+    for name in (name for name in POSE if name in robot.model.workspace):
+        low, high = robot.model.workspace[name]
         k = POSE.index(name)
         if not low <= middle[k] <= high:
             middle[k] = (low + high) / 2.0

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.core import instruments, screws
 from pkmcal.readings import orientation
 from pkmcal.readings.alignment import nearest_rotations
@@ -22,6 +22,7 @@ _UNBENDING = 20  # rounds of undoing the distortion
 _STEPS = 30  # of Levenberg and Marquardt
 _SMALL = 1e-10  # step, as a share of the distance and in rad, at which a place is found
 _SAME = 1e-4  # turning between two places, rad, below which they are one
+_LINE = 0.01  # square across over along, at which corners of a picture are in a line
 _FLAT = 1e-6  # share of a board's size by which its corners may stand off a plane
 
 
@@ -83,6 +84,19 @@ def unbent(pixel: FloatArray, lens: FloatArray) -> FloatArray:
         found = found - np.linalg.solve(by_twist[:, :, 3:5], off[:, :, None])[:, :, 0]
     found[~(np.abs(off).max(axis=1) < 1e-6 * lens[:, 0])] = np.nan
     return found
+
+
+def in_a_line(corner: FloatArray, picture: IntArray, pictures: int) -> BoolArray:
+    """Pictures (P,) of which corners (N, 3) are in a line, or nearly: they tell no turning."""
+    squares = np.zeros((pictures, 3, 3))
+    count = np.maximum(np.bincount(picture, minlength=pictures), 1)
+    middle = (
+        np.stack([np.bincount(picture, x, pictures) for x in corner.T], axis=1) / count[:, None]
+    )
+    away = corner - middle[picture]
+    np.add.at(squares, picture, away[:, :, None] * away[:, None, :])
+    size = np.linalg.eigvalsh(squares)
+    return np.asarray(size[:, 1] <= _LINE * size[:, 2])
 
 
 def mm_per_pixel(corner: FloatArray, pixel: FloatArray) -> float:

@@ -25,7 +25,7 @@ from pkmcal.core import instruments, screws
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.csv_table import Table
 from pkmcal.readings import rows, twists
-from pkmcal.readings.board_poses import board_poses, mm_per_pixel, unbent
+from pkmcal.readings.board_poses import board_poses, in_a_line, mm_per_pixel, unbent
 from pkmcal.readings.boards import Board
 from pkmcal.readings.lens_doubts import lens_doubts
 from pkmcal.readings.lens_files import read_lens
@@ -269,6 +269,7 @@ class Camera(Reading):
         flat = np.linalg.svd(corner - corner.mean(axis=0), compute_uv=False)
         fewest = _FEWEST if flat[-1] <= 1e-6 * flat[0] else 6
         enough = np.bincount(picture[known], minlength=int(picture.max()) + 1) >= fewest
+        enough &= ~in_a_line(corner[known], picture[known], len(enough))
         used = np.flatnonzero(known & enough[picture])
         return used, np.unique(picture[used], return_inverse=True)[1].reshape(-1)
 

@@ -17,7 +17,7 @@ from pkmcal.display import Table, printable
 from pkmcal.exceptions import ArgumentError, FileError
 from pkmcal.files.csv_writer import WrittenColumn, write_csv
 from pkmcal.readings import orientation
-from pkmcal.readings.board_poses import board_poses
+from pkmcal.readings.board_poses import board_poses, in_a_line
 from pkmcal.readings.boards import Board
 from pkmcal.readings.camera import Camera
 from pkmcal.result import Result
@@ -298,12 +298,16 @@ def _of_one_board(
 
     By the lens where it is known; else by a projection of a plane, which hardly bends.
     """
+    pictures = list(pictures)
     tilts = np.full((len(pictures), 3), np.nan)
     off = np.full(len(pictures), np.nan)
     for i, each in enumerate(pictures):
         if each.bad:
             continue
         places = board.at(each.seen.ids)
+        if in_a_line(places, np.zeros(len(places), dtype=np.intp), 1)[0]:
+            pictures[i] = each._replace(bad=f"{len(places)} corners in a line tell no turning")
+            continue
         if camera is not None:
             one = np.zeros(len(places), dtype=np.intp)
             found = board_poses(places, each.seen.pixel, camera.lens_numbers(), one)

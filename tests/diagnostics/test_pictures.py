@@ -177,3 +177,17 @@ def test_what_alone_tells_the_size_of_a_machine_is_named(
         found = pk.identify(robot, measured, free)
     levels = {each.check: each.level for each in found.verdict.said}
     assert levels.get("scale") == level
+
+
+def test_pictures_of_corners_in_a_line_place_nothing(sound: pk.Measurements) -> None:
+    """Six corners in a row tell no turning of the board; all rows are fitted all the same."""
+    row = np.arange(len(sound)) % len(BOARD.ids)
+    values = np.where(((sound.group == 4) & (row > 5))[:, None], np.nan, sound.values)
+    measured = replace(sound, values=values, actuator_sigma=0.0)
+    pose = np.repeat(pk.load("hexapod").home[None], len(sound), axis=0)
+    seen = np.isfinite(measured.instrument.places_seen(measured, pose)).all(axis=1)
+    assert not seen[sound.group == 4].any() and seen[sound.group == 5].any()
+    found = pk.identify(pk.load("hexapod"), measured, free=[])
+    assert (
+        np.isfinite(found.residuals[0]).all(axis=1).sum() == np.isfinite(values).all(axis=1).sum()
+    )
