@@ -23,7 +23,7 @@ from pkmcal.view import page, parallel
 
 Table = dict[str, Any]
 LEVELS = {"grave": "not calibrated", "doubt": "doubtful", "remark": "note"}
-_MOST_ROWS = 3000  # that the picture draws and the table lists; the outliers are always among them
+_MOST_ROWS, _MOST_ARROWS = 3000, 1000  # that are listed and drawn: the worst
 _STATEMENTS = ("machine", "serial", "customer", "operator", "date", "instrument", "temperature",
                "method")  # fmt: skip
 
@@ -114,7 +114,8 @@ def _rows(
             at, first, last = (_vector(each) for each in vectors)
             arrows.append({"row": row, "name": f"row {row}", "at": at, "before": first,
                            "after": last, "outlier": point["outlier"]})  # fmt: skip
-    return rows, arrows
+    arrows.sort(key=lambda arrow: -max(map(abs, arrow["after"])))
+    return rows, arrows[:_MOST_ARROWS]
 
 
 def _dropped(row: int, lines: Sequence[tuple[str, int]]) -> Table:
@@ -167,4 +168,4 @@ def _number(value: float) -> float | None:
 
 
 def _vector(values: FloatArray | Iterable[float]) -> list[float]:
-    return [float(f"{value:.6g}") for value in values]
+    return [float(f"{value:.5g}") for value in values]

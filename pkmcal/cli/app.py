@@ -46,7 +46,7 @@ def app(
         from pkmcal.app.launch import launch
     except ImportError as error:
         raise ArgumentError(
-            f"pkmcal app needs {error.name}: pip install 'pkmcal[app]' installs what it needs"
+            f"pkmcal app needs {error.name}: python -m pip install starlette uvicorn"
         ) from None
     launch(folder, say, browser, port)
     return 0

@@ -1,13 +1,9 @@
 // The window: five screens over one project that the server keeps.
 import * as server from './transport.js'
-import { app, attempt, frame, go, trouble } from './frame.js'
-import { machine } from './machine.js'
-import { plan } from './plan.js'
-import { measure } from './measure.js'
-import { result } from './result.js'
-import { out } from './out.js'
+import { STEPS, app, attempt, frame, go, trouble } from './frame.js'
 
-Object.assign(app.screens, { machine, plan, measure, result, out })
+// each screen is fetched when it is first shown
+for (const [step] of STEPS) app.screens[step] = async main => (await import(`./${step}.js`))[step](main)
 window.workbench = app // what tests ask
 addEventListener('unhandledrejection', event => trouble(event.reason?.message ?? String(event.reason)))
 
