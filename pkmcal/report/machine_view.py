@@ -32,8 +32,8 @@ def element(found: Identification) -> tuple[str, str]:
     if isinstance(robot, Robot) and parallel.beyond(robot.model):
         return "", ""
     data = page.machine(robot, cloud=False)  # the report has its own pictures of the workspace
-    data["places"] = _measured(found)
-    data["calibration"] = {"points": _points(found), "change": _change(found)}
+    data["places"] = measured_poses(found)
+    data["calibration"] = {"points": _points(found), "change": change(found)}
     return page.plain_element(data)
 
 
@@ -57,7 +57,7 @@ def _points(found: Identification) -> list[dict[str, Any]]:
     return points
 
 
-def _measured(found: Identification) -> dict[str, Any]:
+def measured_poses(found: Identification) -> dict[str, Any]:
     """The measured poses as the identified machine has them, with their actuators."""
     end = found.fit.end
     reached = np.flatnonzero(np.isfinite(end.pose).all(axis=1) & (end.status == 0))
@@ -68,7 +68,7 @@ def _measured(found: Identification) -> dict[str, Any]:
     return page.places(name, found.robot, end.pose[chosen], q)
 
 
-def _change(found: Identification) -> dict[str, Any]:
+def change(found: Identification) -> dict[str, Any]:
     """Numbers of the machine that changed, as the core has them, before and after.
 
     None of a machine with drive laws, whose numbers are not in the memory of the page's core: there
