@@ -18,7 +18,7 @@ from pkmcal.jobs.calibration import Calibration
 from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.kinematics.robot import Robot
 from pkmcal.report import contents, machine_view
-from pkmcal.report.residual_vectors import measured_places, residual_vectors
+from pkmcal.report.rows import rows as every_row
 from pkmcal.view import page, parallel
 
 Table = dict[str, Any]
@@ -51,7 +51,7 @@ def calibration(found: Identification, job: Calibration, lines: Sequence[tuple[s
         File and line of each row.
     """
     verdict = found.verdict
-    rows, arrows = _rows(found, lines)
+    rows, left_out, arrows = _rows(found, lines)
     return {
         "name": found.robot.name,
         "verdict": {
@@ -65,7 +65,7 @@ def calibration(found: Identification, job: Calibration, lines: Sequence[tuple[s
         "numbers": _numbers(found),
         "machine": list(free(found.robot)),
         "others": [name for name in free(found.robot) if name not in set(found.free)],
-        "dropped": [_dropped(row, lines) for row in found.dropped],
+        "dropped": left_out,
         "outliers": [int(row) for row in found.outliers],
         "view": _view(found, arrows),
     }
@@ -90,37 +90,28 @@ def _said(said: Any, job: Calibration) -> Table:
 
 def _rows(
     found: Identification, lines: Sequence[tuple[str, int]]
-) -> tuple[list[Table], list[Table]]:
-    """Return the rows of the table, and those with a place as the picture draws them."""
-    before, after = (residual_vectors(found, at) for at in (found.fit.start, found.fit.end))
-    places = measured_places(found)
-    points = contents.points(found)
-    if len(points) > _MOST_ROWS:
-        worst = np.argsort(
-            [-each["after"] if np.isfinite(each["after"]) else 0.0 for each in points]
-        )
-        points = [points[i] for i in sorted(worst[:_MOST_ROWS].tolist())]
-    index = {int(row): k for k, row in enumerate(found.rows)}
-    rows, arrows = [], []
-    for point in points:
-        k, row = index[point["row"]], point["row"]
+) -> tuple[list[Table], list[Table], list[Table]]:
+    """Return rows that were fitted, those left out, and the worst with a place, as drawn."""
+    listed = every_row(found)
+    fitted, left_out, arrows = list[Table](), list[Table](), list[Table]()
+    worst = np.argsort(np.where(np.isfinite(listed.off), -listed.off, np.inf), kind="stable")
+    for k in worst.tolist():
+        use, row = listed.use[k], int(listed.row[k])
+        if use == "held out":
+            continue  # of another file it has a number of its own
         file, line = lines[row] if row < len(lines) else ("", -1)
-        rows.append({
-            "row": row, "file": file, "line": line, "outlier": point["outlier"],
-            "before": _number(point["before"]), "after": _number(point["after"]),
-        })  # fmt: skip
-        vectors = [places[k], before[k], after[k]]
-        if np.isfinite(vectors).all():
+        told = {
+            "row": row, "file": file, "line": line, "outlier": bool(listed.outlier[k]),
+            "before": _number(listed.off_before[k]), "after": _number(listed.off[k]),
+        }  # fmt: skip
+        (fitted if use == "fitted" else left_out).append(told)
+        vectors = [listed.at[k], listed.before[k], listed.after[k]]
+        if use == "fitted" and np.isfinite(vectors).all():
             at, first, last = (_vector(each) for each in vectors)
             arrows.append({"row": row, "name": f"row {row}", "at": at, "before": first,
-                           "after": last, "outlier": point["outlier"]})  # fmt: skip
-    arrows.sort(key=lambda arrow: -max(map(abs, arrow["after"])))
-    return rows, arrows[:_MOST_ARROWS]
-
-
-def _dropped(row: int, lines: Sequence[tuple[str, int]]) -> Table:
-    file, line = lines[row] if row < len(lines) else ("", -1)
-    return {"row": int(row), "file": file, "line": line}
+                           "after": last, "outlier": told["outlier"]})  # fmt: skip
+    left_out.sort(key=lambda told: int(told["row"]))
+    return fitted[:_MOST_ROWS], left_out, arrows[:_MOST_ARROWS]
 
 
 def _numbers(found: Identification) -> list[Table]:

@@ -93,7 +93,7 @@ function rows(parent, found, refit) {
   for (const each of found.dropped) {
     const line = made('tr', table, { className: 'out', id: `row-${each.row}` })
     use(line, each, false)
-    for (const text of [each.row, placeOf(each), '–', 'left out']) made('td', line, { text })
+    for (const text of [each.row, placeOf(each), short(each.before), `${short(each.after)} left out`]) made('td', line, { text })
   }
   const worst = [...found.rows].sort((a, b) => (b.after ?? 0) - (a.after ?? 0)).slice(0, app.all ? Infinity : LEAST)
   for (const each of worst) {
