@@ -102,7 +102,7 @@ def _rows(
         file, line = lines[row] if row < len(lines) else ("", -1)
         told = {
             "row": row, "file": file, "line": line, "outlier": bool(listed.outlier[k]),
-            "before": _number(listed.off_before[k]), "after": _number(listed.off[k]),
+            "before": _number(listed.off_before[k], 5), "after": _number(listed.off[k], 5),
         }  # fmt: skip
         (fitted if use == "fitted" else left_out).append(told)
         vectors = [listed.at[k], listed.before[k], listed.after[k]]
@@ -153,9 +153,9 @@ def certificate(stated: Mapping[str, object]) -> str:
     return tomli_w.dumps({name: value for name, value in stated.items() if value})
 
 
-def _number(value: float) -> float | None:
+def _number(value: float, digits: int = 7) -> float | None:
     """Return a number with the digits that a page needs; None where it is none."""
-    return float(f"{value:.7g}") if np.isfinite(value) else None
+    return float(f"{value:.{digits}g}") if np.isfinite(value) else None
 
 
 def _vector(values: FloatArray | Iterable[float]) -> list[float]:
