@@ -18,7 +18,7 @@ from pkmcal.jobs.calibration import Calibration
 from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.kinematics.robot import Robot
 from pkmcal.report import contents, machine_view
-from pkmcal.report.residual_vectors import measured_places, residual_vectors
+from pkmcal.report.rows import rows
 from pkmcal.view import page, parallel
 
 Table = dict[str, Any]
@@ -51,7 +51,7 @@ def calibration(found: Identification, job: Calibration, lines: Sequence[tuple[s
         File and line of each row.
     """
     verdict = found.verdict
-    rows, arrows = _rows(found, lines)
+    listed, arrows = _rows(found, lines)
     return {
         "name": found.robot.name,
         "verdict": {
@@ -61,11 +61,10 @@ def calibration(found: Identification, job: Calibration, lines: Sequence[tuple[s
             "said": [_said(each, job) for each in verdict.said],
         },
         "summary": found.summary(),
-        "rows": rows,
+        "rows": listed,
         "numbers": _numbers(found),
         "machine": list(free(found.robot)),
         "others": [name for name in free(found.robot) if name not in set(found.free)],
-        "dropped": [_dropped(row, lines) for row in found.dropped],
         "outliers": [int(row) for row in found.outliers],
         "view": _view(found, arrows),
     }
@@ -91,36 +90,25 @@ def _said(said: Any, job: Calibration) -> Table:
 def _rows(
     found: Identification, lines: Sequence[tuple[str, int]]
 ) -> tuple[list[Table], list[Table]]:
-    """Return the rows of the table, and those with a place as the picture draws them."""
-    before, after = (residual_vectors(found, at) for at in (found.fit.start, found.fit.end))
-    places = measured_places(found)
-    points = contents.points(found)
-    if len(points) > _MOST_ROWS:
-        worst = np.argsort(
-            [-each["after"] if np.isfinite(each["after"]) else 0.0 for each in points]
-        )
-        points = [points[i] for i in sorted(worst[:_MOST_ROWS].tolist())]
-    index = {int(row): k for k, row in enumerate(found.rows)}
-    rows, arrows = [], []
-    for point in points:
-        k, row = index[point["row"]], point["row"]
-        file, line = lines[row] if row < len(lines) else ("", -1)
-        rows.append({
-            "row": row, "file": file, "line": line, "outlier": point["outlier"],
-            "before": _number(point["before"]), "after": _number(point["after"]),
+    """Return the rows of the table, the worst first, and those that the picture draws."""
+    listed = rows(found)
+    worst = np.argsort(-np.nan_to_num(listed.off, nan=-1.0), kind="stable")
+    told: list[Table] = []
+    arrows: list[Table] = []
+    for k in worst[:_MOST_ROWS].tolist():
+        row, use, odd = int(listed.row[k]), listed.use[k], bool(listed.outlier[k])
+        file, line = lines[row] if use != "held out" and row < len(lines) else ("", -1)
+        told.append({
+            "row": row, "use": use, "name": listed.name[k], "place": f"{file}:{line}" * (line > 0),
+            "before": _number(listed.off_before[k]), "after": _number(listed.off[k]),
+            "outlier": odd,
         })  # fmt: skip
-        vectors = [places[k], before[k], after[k]]
-        if np.isfinite(vectors).all():
+        vectors = listed.at[k], listed.before[k], listed.after[k]
+        if use == "fitted" and len(arrows) < _MOST_ARROWS and np.isfinite(vectors).all():
             at, first, last = (_vector(each) for each in vectors)
-            arrows.append({"row": row, "name": f"row {row}", "at": at, "before": first,
-                           "after": last, "outlier": point["outlier"]})  # fmt: skip
-    arrows.sort(key=lambda arrow: -max(map(abs, arrow["after"])))
-    return rows, arrows[:_MOST_ARROWS]
-
-
-def _dropped(row: int, lines: Sequence[tuple[str, int]]) -> Table:
-    file, line = lines[row] if row < len(lines) else ("", -1)
-    return {"row": int(row), "file": file, "line": line}
+            arrows.append({"row": row, "name": listed.name[k], "at": at, "before": first,
+                           "after": last, "outlier": odd})  # fmt: skip
+    return told, arrows
 
 
 def _numbers(found: Identification) -> list[Table]:
