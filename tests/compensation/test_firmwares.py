@@ -166,6 +166,12 @@ def test_each_word_is_corrected_or_refused(firmware: str, tmp_path: Path) -> Non
                     raise AssertionError(f"{word!r}: {wrong!r}") from wrong
 
 
+@pytest.mark.parametrize("firmware", ["marlin", "reprap"])
+def test_filament_that_begins_anew_in_inches_is_in_inches(firmware: str, tmp_path: Path) -> None:
+    text = "G28\nG20\nG90\nM82\nG92 E0\nG1 X0 Y0 Z1.5 F60\nG92 E4\nG1 X1 Y0.4 E4.1\nG1 X0 E4.2\n"
+    assert followed(text, firmware, tmp_path, True, False)
+
+
 @pytest.mark.parametrize("firmware", ["marlin", "reprap", "klipper"])
 def test_filament_is_as_meant_after_any_order_of_modes(firmware: str, tmp_path: Path) -> None:
     orders = list(product(("G90", "G91", "M82", "M83"), repeat=3))
