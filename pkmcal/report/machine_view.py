@@ -12,15 +12,13 @@ import numpy as np
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray
 from pkmcal.calibration.identification import Identification
-from pkmcal.fitted.row_names import row_names
 from pkmcal.kinematics.calibratable import as_given
 from pkmcal.kinematics.robot import Robot
 from pkmcal.report.drawing import sample
 from pkmcal.report.exaggerated import middle_exaggerated
-from pkmcal.report.residual_vectors import measured_places, residual_vectors
+from pkmcal.report.rows import rows
 from pkmcal.view import page, parallel
 
-_NAMED = 100  # outliers, which have the names of their lines; others have numbers
 _MORE = 10  # times the exaggeration that is drawn at first
 _POSES = 200  # measured poses that can be visited
 
@@ -40,25 +38,20 @@ def element(found: Identification) -> tuple[str, str]:
 
 
 def _points(found: Identification) -> list[dict[str, Any]]:
-    before, after = (residual_vectors(found, at) for at in (found.fit.start, found.fit.end))
-    places = measured_places(found)
-    odd = np.isin(found.rows, found.outliers)
-    drawn = sample(len(places), odd)
-    names = found.fit.equations.prediction.datasets
-    named = {int(row): row_names(names, [row]) for row in found.outliers[:_NAMED]}
+    listed = rows(found)
     points = []
-    for k in drawn:
-        numbers = np.concatenate([places[k], before[k], after[k]])
+    fitted = np.array([use == "fitted" for use in listed.use])
+    for k in sample(int(fitted.sum()), listed.outlier[fitted]):
+        numbers = np.concatenate([listed.at[k], listed.before[k], listed.after[k]])
         if not np.isfinite(numbers).all():
             continue
-        row = int(found.rows[k])
         points.append(
             {
-                "name": named.get(row, f"row {row}"),
-                "at": places[k].round(3).tolist(),
-                "before": [float(f"{x:.5g}") for x in before[k]],
-                "after": [float(f"{x:.5g}") for x in after[k]],
-                "outlier": bool(odd[k]),
+                "name": listed.name[k] if listed.outlier[k] else f"row {listed.row[k]}",
+                "at": listed.at[k].round(3).tolist(),
+                "before": [float(f"{x:.5g}") for x in listed.before[k]],
+                "after": [float(f"{x:.5g}") for x in listed.after[k]],
+                "outlier": bool(listed.outlier[k]),
             }
         )
     return points
