@@ -37,6 +37,8 @@ class Asking:
         connection.request(method, path, text, {"x-pkmcal-token": self.served.token})
         answer = connection.getresponse().read()
         connection.close()
+        if path.startswith("/api/run/") and b'"result"' not in answer:
+            raise RuntimeError(f"{path}: {answer.decode()}")  # its time is none of a result
         return answer
 
     def take(self, table: dict[str, Any]) -> None:

@@ -18,7 +18,7 @@ from pkmcal.jobs.calibration import Calibration
 from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.kinematics.robot import Robot
 from pkmcal.report import contents, machine_view
-from pkmcal.report.rows import rows
+from pkmcal.report.rows import rows as every_row
 from pkmcal.view import page, parallel
 
 Table = dict[str, Any]
@@ -51,7 +51,7 @@ def calibration(found: Identification, job: Calibration, lines: Sequence[tuple[s
         File and line of each row.
     """
     verdict = found.verdict
-    listed, arrows = _rows(found, lines)
+    rows, left_out, arrows = _rows(found, lines)
     return {
         "name": found.robot.name,
         "verdict": {
@@ -61,10 +61,11 @@ def calibration(found: Identification, job: Calibration, lines: Sequence[tuple[s
             "said": [_said(each, job) for each in verdict.said],
         },
         "summary": found.summary(),
-        "rows": listed,
+        "rows": rows,
         "numbers": _numbers(found),
         "machine": list(free(found.robot)),
         "others": [name for name in free(found.robot) if name not in set(found.free)],
+        "dropped": left_out,
         "outliers": [int(row) for row in found.outliers],
         "view": _view(found, arrows),
     }
@@ -89,26 +90,28 @@ def _said(said: Any, job: Calibration) -> Table:
 
 def _rows(
     found: Identification, lines: Sequence[tuple[str, int]]
-) -> tuple[list[Table], list[Table]]:
-    """Return the rows of the table, the worst first, and those that the picture draws."""
-    listed = rows(found)
-    worst = np.argsort(-np.nan_to_num(listed.off, nan=-1.0), kind="stable")
-    told: list[Table] = []
-    arrows: list[Table] = []
-    for k in worst[:_MOST_ROWS].tolist():
-        row, use, odd = int(listed.row[k]), listed.use[k], bool(listed.outlier[k])
-        file, line = lines[row] if use != "held out" and row < len(lines) else ("", -1)
-        told.append({
-            "row": row, "use": use, "name": listed.name[k], "place": f"{file}:{line}" * (line > 0),
+) -> tuple[list[Table], list[Table], list[Table]]:
+    """Return rows that were fitted, those left out, and the worst with a place, as drawn."""
+    listed = every_row(found)
+    fitted, left_out, arrows = list[Table](), list[Table](), list[Table]()
+    worst = np.argsort(np.where(np.isfinite(listed.off), -listed.off, np.inf), kind="stable")
+    for k in worst.tolist():
+        use, row = listed.use[k], int(listed.row[k])
+        if use == "held out":
+            continue  # of another file it has a number of its own
+        file, line = lines[row] if row < len(lines) else ("", -1)
+        told = {
+            "row": row, "file": file, "line": line, "outlier": bool(listed.outlier[k]),
             "before": _number(listed.off_before[k]), "after": _number(listed.off[k]),
-            "outlier": odd,
-        })  # fmt: skip
-        vectors = listed.at[k], listed.before[k], listed.after[k]
-        if use == "fitted" and len(arrows) < _MOST_ARROWS and np.isfinite(vectors).all():
+        }  # fmt: skip
+        (fitted if use == "fitted" else left_out).append(told)
+        vectors = [listed.at[k], listed.before[k], listed.after[k]]
+        if use == "fitted" and np.isfinite(vectors).all():
             at, first, last = (_vector(each) for each in vectors)
-            arrows.append({"row": row, "name": listed.name[k], "at": at, "before": first,
-                           "after": last, "outlier": odd})  # fmt: skip
-    return told, arrows
+            arrows.append({"row": row, "name": f"row {row}", "at": at, "before": first,
+                           "after": last, "outlier": told["outlier"]})  # fmt: skip
+    left_out.sort(key=lambda told: int(told["row"]))
+    return fitted[:_MOST_ROWS], left_out, arrows[:_MOST_ARROWS]
 
 
 def _numbers(found: Identification) -> list[Table]:

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
+from pkmcal.measurements.pose_csv import read_poses
 
 pytest.importorskip("starlette", reason="the extra app is not installed")
 pytest.importorskip("uvicorn", reason="the extra app is not installed")
@@ -129,6 +130,8 @@ def test_a_metrologist_leaves_bad_rows_out_and_gets_what_the_command_says(
             fits(page, count)
             assert page.evaluate("workbench.picture.machine.scene.turn") == look
         assert page.locator("tr.odd").count() == 0
+        left = page.locator("tr.out td:last-child").all_inner_texts()  # how far off they would be
+        assert [round(float(each.split()[0])) for each in left] == [3, 4]
         page.get_by_role("button", name="show row 3", exact=True).click()
         assert page.evaluate("workbench.picture.machine.calibration.named.row") == 3
         at = page.evaluate(
@@ -171,6 +174,22 @@ def test_a_plan_is_made_shown_and_saved(tmp_path: Path) -> None:
         with page.expect_download() as taken:
             page.get_by_role("button", name="Save plan/commands.csv").click()
         assert len(Path(taken.value.path()).read_text().splitlines()) >= 13
+
+
+def test_an_imported_printer_is_planned_for_its_own_probe_on_its_bed(tmp_path: Path) -> None:
+    with browser.served(tmp_path / "project") as served, browser.page_of(served) as page:
+        page.set_input_files("input[type=file]", PRINTER)
+        page.locator(".pkmcal-view.moves").wait_for()
+        page.get_by_role("button", name="2 Plan").click()
+        page.get_by_role("button", name="Choose poses").click()
+        page.locator("main.plan .pkmcal-view.moves").wait_for()
+        assert 'kind = "probe"' in (served.folder / "project.toml").read_text()
+        with page.expect_download():
+            page.get_by_role("button", name="Save plan/poses.csv").click()
+        robot = pk.load(served.folder / "machine" / "robot.toml")
+        poses = read_poses(served.folder / "plan" / "poses.csv", robot)
+        assert np.ptp(poses[:, 2]) == 0
+        assert np.hypot(poses[:, 0], poses[:, 1]).max() <= 120 + 1e-5  # its radius, as rounded
 
 
 def test_two_tabs_show_one_project(tmp_path: Path) -> None:

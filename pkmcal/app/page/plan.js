@@ -3,11 +3,13 @@ import { app, button, change, choice, field, made, work } from './frame.js'
 import { draw } from './picture.js'
 import { save } from './transport.js'
 
+const KINDS = [['probe', 'its own probe, on the bed'], ['position', 'positions'], ['pose', 'poses'], ['height', 'heights'], ['distance', 'distances']]
+
 export async function plan(main) {
   made('h1', main, { text: 'Where to measure' })
   const now = app.project.state.plan ?? {}, form = made('form', main, { className: 'settings' })
   const number = (value, settings) => made('input', null, { type: 'number', step: 'any', min: 0, value: value ?? '', ...settings })
-  const kind = choice(form, 'what the instrument reads', [['position', 'positions'], ['pose', 'poses'], ['height', 'heights'], ['distance', 'distances']], now.kind ?? 'position', () => {})
+  const kind = choice(form, 'what the instrument reads', KINDS, now.kind ?? (app.project.state.import ? 'probe' : 'position'), () => {})
   const count = field(form, 'poses', number(now.count ?? 20, { step: 1, min: 1 }))
   const noise = field(form, 'its noise, mm', number(now.noise ?? '', { placeholder: '0.02' }))
   const accuracy = field(form, 'or as many as reach, mm', number(now.accuracy))

@@ -34,7 +34,7 @@ export async function result(main) {
     parts.table.replaceChildren()
     made('pre', parts.table, { text: found.summary, tabindex: 0 })
     for (const each of found.numbers) before[each.name] = each.stderr
-    if (found.view) await draw(picture, found.view, row => mark(`row-${row}`, true))
+    if (found.view) await draw(picture, found.view, row => mark(row, true))
     main.dataset.fits = +main.dataset.fits + 1
   }
   pick(app.part ?? 'rows')
@@ -63,14 +63,15 @@ function held(parent, refit) {
   choice(parent, 'outliers', [['', 'count in full'], ['huber', 'count less'], ['cauchy', 'hardly count']], fit.loss ?? '', value => set('loss', value))
 }
 
-function mark(id, scroll) {
+function mark(row, scroll) {
   for (const one of document.querySelectorAll('tr.named')) one.classList.remove('named')
-  const line = document.getElementById(id)
+  const line = document.getElementById(`row-${row}`)
   line?.classList.add('named')
   if (scroll) line?.scrollIntoView({ block: 'nearest' })
 }
 
 const short = x => (x === null || x === undefined ? '–' : Math.abs(x) >= 1000 ? x.toFixed(0) : Number(x.toPrecision(3)).toString())
+const placeOf = ({ file, line, row }) => (line > 0 ? `${file}:${line}` : `row ${row}`)
 
 function rows(parent, found, refit) {
   parent.replaceChildren()
@@ -78,27 +79,31 @@ function rows(parent, found, refit) {
   const wide = made('div', parent, { className: 'wide', tabindex: 0, role: 'region', 'aria-label': 'measured rows' })
   const table = made('table', wide)
   made('caption', table, { text: 'Measured rows, worst first: the distance from where the machine is, mm' })
-  made('tr', table, {}, ...['use', 'row', 'before', 'after', ''].map(text => made('th', null, { text, scope: 'col' })))
-  const shown = found.rows.slice(0, app.all ? Infinity : LEAST)
-  for (const each of shown) {
-    const { row, use, outlier } = each, place = each.place || String(row), id = use === 'held out' ? `held-${row}` : `row-${row}`
-    const line = made('tr', table, { id, className: use === 'fitted' ? (outlier ? 'odd' : '') : 'out' })
-    const cell = made('td', line)
-    if (use !== 'held out') {
-      const box = made('input', cell, { type: 'checkbox', 'aria-label': `use row ${row}` })
-      box.checked = use === 'fitted'
-      box.onclick = event => event.stopPropagation()
-      box.onchange = () => refit(fit => {
-        fit.drop = box.checked ? drop.filter(one => one !== place && one !== String(row)) : [...drop, place]
-        if (!fit.drop.length) delete fit.drop
-      })
-    }
-    const point = () => { mark(id); selected(row) }
-    const name = button(made('td', line), each.name, point, { className: 'plain', 'aria-label': `show row ${row}` })
-    line.onclick = event => { if (event.target !== name) point() }
-    for (const text of [short(each.before), short(each.after), use === 'fitted' ? (outlier ? 'outlier' : '') : use]) made('td', line, { text })
+  made('tr', table, {}, ...['use', 'row', 'line', 'before', 'after'].map(text => made('th', null, { text, scope: 'col' })))
+  const use = (line, each, kept) => {
+    const place = each.line > 0 ? `${each.file}:${each.line}` : String(each.row)
+    const box = made('input', made('td', line), { type: 'checkbox', 'aria-label': `use row ${each.row}` })
+    box.checked = kept
+    box.onclick = event => event.stopPropagation()
+    box.onchange = () => refit(fit => {
+      fit.drop = box.checked ? drop.filter(one => one !== place && one !== String(each.row)) : [...drop, place]
+      if (!fit.drop.length) delete fit.drop
+    })
   }
-  if (shown.length < found.rows.length) button(parent, `show all ${found.rows.length} rows`, () => { app.all = true; rows(parent, found, refit) })
+  for (const each of found.dropped) {
+    const line = made('tr', table, { className: 'out', id: `row-${each.row}` })
+    use(line, each, false)
+    for (const text of [each.row, placeOf(each), short(each.before), `${short(each.after)} left out`]) made('td', line, { text })
+  }
+  const worst = [...found.rows].sort((a, b) => (b.after ?? 0) - (a.after ?? 0)).slice(0, app.all ? Infinity : LEAST)
+  for (const each of worst) {
+    const line = made('tr', table, { id: `row-${each.row}`, className: each.outlier ? 'odd' : '' })
+    use(line, each, true)
+    const name = button(made('td', line), String(each.row), () => { mark(each.row); selected(each.row) }, { className: 'plain', 'aria-label': `show row ${each.row}` })
+    line.onclick = event => { if (event.target !== name) { mark(each.row); selected(each.row) } }
+    for (const text of [each.line > 0 ? placeOf(each) : '', short(each.before), `${short(each.after)}${each.outlier ? ' outlier' : ''}`]) made('td', line, { text })
+  }
+  if (worst.length < found.rows.length) button(parent, `show all ${found.rows.length} rows`, () => { app.all = true; rows(parent, found, refit) })
 }
 
 function numbers(parent, found, before, refit) {
