@@ -20,9 +20,20 @@ def row_names(datasets: Sequence[FitData], rows: Iterable[int]) -> str:
         mine = np.flatnonzero(np.isin(data.rows, named))
         where.update(zip(data.rows[mine].tolist(), ((data, i) for i in mine.tolist()), strict=True))
     places: dict[str, list[str]] = {}
+    whole = dict[tuple[int, int], int]()
+    for data, i in where.values():
+        if data.measured.group is not None:
+            key = id(data), int(data.measured.group[i])
+            whole[key] = whole.get(key, 0) + 1
     for row in named:
         data, i = where[row]
         measured = data.measured
+        if measured.group is not None:
+            count = whole[id(data), int(measured.group[i])]
+            if count > _MOST:
+                file = f" of {printable(measured.file)}" if measured.file else ""
+                places.setdefault(f"pose {measured.group[i]}{file} ({count} rows)", [])
+                continue
         if measured.lines is None:
             place = f"row {row}"
         else:
