@@ -166,14 +166,15 @@ def chained(rows: FloatArray, matrices: FloatArray, place: IntArray) -> FloatArr
     one in common, as the corners of a picture, each is one product: copies would take most time.
     """
     starts = np.flatnonzero(np.diff(place, prepend=-1))
-    if len(starts) * _LONG > len(rows):
+    if len(starts) * _LONG >= len(rows):
         each = np.array_equal(place, np.arange(len(matrices)))
         return rows @ (matrices if each else matrices[place])
-    found = np.empty((*rows.shape[:2], matrices.shape[2]))
+    (_, k, w), m = rows.shape, matrices.shape[2]
+    found = np.empty((len(rows), k, m))
     ends = [*starts[1:].tolist(), len(rows)]
     for first, last in zip(starts.tolist(), ends, strict=True):
-        flat = rows[first:last].reshape(-1, rows.shape[2])
-        into = found[first:last].reshape(-1, found.shape[2])
+        count = (last - first) * k
+        flat, into = rows[first:last].reshape(count, w), found[first:last].reshape(count, m)
         np.matmul(flat, matrices[place[first]], out=into)
     return found
 

@@ -65,10 +65,13 @@ def test_a_pixel_is_the_distance_over_the_focal_length_where_boards_are_across()
     assert np.isnan(mm_per_pixel(corner[line], pixel[line], picture[line])).all()
 
 
-@pytest.mark.parametrize("each", [1, 3, 40])
-def test_derivatives_are_chained_alike_however_many_rows_share_a_matrix(each: int) -> None:
+@pytest.mark.parametrize("width", [0, 9])
+@pytest.mark.parametrize("each", [0, 1, 3, 40])
+def test_derivatives_are_chained_alike_however_many_rows_share_a_matrix(
+    each: int, width: int
+) -> None:
     random = np.random.default_rng(0)
-    matrices = random.normal(size=(5, 6, 9))
+    matrices = random.normal(size=(5, 6, width))
     place = np.repeat([3, 0, 4, 0], each)
     rows = random.normal(size=(len(place), 2, 6))
     expected = np.einsum("nij,njk->nik", rows, matrices[place])
