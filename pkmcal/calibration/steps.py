@@ -89,6 +89,17 @@ class Rows:
             dropped=tuple(sorted({*self.dropped, *rows})),
         )
 
+    @property
+    def left(self) -> tuple[tuple[FitData, int], ...]:
+        """Sets of the rows that are left out, each with the number of the fitted one like it."""
+        found = []
+        for data in self.given:
+            mine = np.flatnonzero(np.isin(data.rows, self.dropped))
+            like = [bool(np.isin(each.rows, data.rows).any()) for each in self.fitted]
+            if len(mine) and any(like):
+                found.append((data.select(mine), like.index(True)))
+        return tuple(found)
+
 
 def prepare(
     machine: Calibratable,
@@ -229,6 +240,7 @@ def result(rows: Rows, fit: Fit, held: HeldOut, find_slack: bool) -> Identificat
         datum=fit.datum,
         dropped=rows.dropped,
         dropped_names=row_names(rows.given, rows.dropped),
+        dropped_data=rows.left,
         slack=slack_cables(estimator.equations, estimate, cells),
     )
 

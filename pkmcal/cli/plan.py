@@ -143,10 +143,10 @@ def plan(
 def carried_out(job: Planning, out: Path | None, force: bool, json: bool) -> int:
     """Plan, write, print, and return the exit code."""
     read = Inputs()
-    machine = planning.machine(job, read)
+    sources = planning.read(job, read)
     output = None if out is None else Output(out, planning.files(job), read, force)
     with progress("choosing poses"):
-        made = planning.run(job, machine, read)
+        made = planning.planned(job, sources)
     written: list[Path] = []
     if output is not None:
         with output.draft() as draft:

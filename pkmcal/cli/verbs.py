@@ -16,6 +16,7 @@ _VERBS = {  # where each is: file and function
     "demo": "demonstration.demo",
     "machines": "machines.machines",
     "show": "show.show",
+    "app": "app.app",
     "new": "new.new",
     "check": "check.check",
     "stiffness": "stiffness.stiffness",

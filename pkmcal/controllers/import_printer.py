@@ -208,7 +208,7 @@ def _of_reprap(path: str | PathLike[str]) -> Stored:
     if rotary_gcode.is_rotary(text, place):
         crank = rotary_gcode.of_reprap(text, place)
         about = _about(where, _DEGREES_HEAD, "reprap", config, probe)
-        robot = rotary_delta.text_of(crank, round(0.5 * max(crank.endstops), 3), about)
+        robot = rotary_delta.text_of(crank, round(0.5 * max(crank.endstops), 3), about, Bed())
     else:
         about = _about(where, _GCODE_HEAD, "reprap", config, probe)
         delta, bed = of_reprap(text, place), reprap_bed(text, place)

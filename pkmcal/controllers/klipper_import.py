@@ -61,7 +61,7 @@ def of_klipper(path: str | PathLike[str]) -> Stored:
         crank = _rotary(printer)
         home = round(0.5 * max(crank.endstops), 3)
         about = About(where.stem, _ROTARY_HEAD.format(file=where.name), probe, controller)
-        text = rotary_delta.text_of(crank, home, about)
+        text = rotary_delta.text_of(crank, home, about, _bed(printer))
     else:
         delta, steps = _linear(printer)
         about = About(where.stem, _LINEAR_HEAD.format(file=where.name), probe, controller)

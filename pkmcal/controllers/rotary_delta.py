@@ -15,6 +15,7 @@ from pkmcal.arrays import FloatArray
 from pkmcal.controllers import robot_files
 from pkmcal.controllers.c_limbs import prepared
 from pkmcal.controllers.laws import require_plain_limbs
+from pkmcal.controllers.linear_delta import Bed
 from pkmcal.controllers.loss import Loss, fitted, require_held
 from pkmcal.controllers.robot_files import About
 from pkmcal.core.library import SLOTS
@@ -24,6 +25,7 @@ from pkmcal.kinematics.workspace import sample_poses
 
 OVER = "over half of its workspace"
 _TOWERS = 3
+_LOWEST = 180.0  # deg: a crank that points inward; no firmware states its lower end
 _POSES = 200
 
 
@@ -164,7 +166,7 @@ def as_robot(delta: RotaryDelta, home: float) -> Robot:
     return robot_files.robot_of(text, "the firmware's numbers")
 
 
-def text_of(delta: RotaryDelta, home: float, about: About) -> str:
+def text_of(delta: RotaryDelta, home: float, about: About, bed: Bed | None = None) -> str:
     """A robot file with these numbers.
 
     Parameters
@@ -175,6 +177,8 @@ def text_of(delta: RotaryDelta, home: float, about: About) -> str:
         Height of the home pose, mm.
     about : About
         Its name and where it comes from.
+    bed : Bed or None
+        Where the nozzle stays; cranks stay below their end stops.
     """
     alike = len(set(delta.heights)) == 1
     parameters = {"radius": delta.radius} | ({"height": delta.heights[0]} if alike else {})
@@ -186,6 +190,7 @@ def text_of(delta: RotaryDelta, home: float, about: About) -> str:
         "# The radius stays: heights hardly tell it from the others. So do the angles: the axes\n"
         "# of the cranks would not turn with them.\n"
     )
+    box = None if bed is None else _box(delta, bed)
     limbs = []
     for i in range(_TOWERS):
         angle = np.radians(delta.angles[i])
@@ -198,8 +203,21 @@ def text_of(delta: RotaryDelta, home: float, about: About) -> str:
         limb |= {"crank": delta.cranks[i], "rod": delta.rods[i]}
         limb |= {"offset": float(np.degrees(delta.elbows[i])), "branch": 1}
         limb |= {"gain": delta.gains[i]}
+        if bed is not None:
+            limb |= {"stroke": [limb["offset"], _LOWEST]}
         limbs.append(limb)
-    return robot_files.text_of(about, pose, free, limbs, parameters, remark)
+    return robot_files.text_of(about, pose, free, limbs, parameters, remark, box)
+
+
+def _box(delta: RotaryDelta, bed: Bed) -> dict[str, list[float]] | None:
+    """The workspace: where arms and rods reach level with the shoulders, below the end stops."""
+    out = min(delta.radius + min(delta.cranks), min(delta.rods) - delta.radius)
+    across, high = round(out, 3), round(min(delta.endstops), 3)
+    if across <= 0.0 or high <= max(0.0, bed.lowest):
+        return None
+    radius = across if bed.radius is None else bed.radius
+    ends = [-across, across]
+    return {"x": ends, "y": ends, "z": [bed.lowest, high], "radius": [0.0, radius]}
 
 
 def _point(x: float, y: float) -> list[float]:

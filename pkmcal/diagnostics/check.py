@@ -49,6 +49,8 @@ class Remedy:
     {'drop': (3, 'outliers'), 'holdout': 0.2}
     >>> Remedy("loss", "cauchy").applied({"loss": ("huber", "cluster")})
     {'loss': ('cluster', 'cauchy')}
+    >>> Remedy("unknown", "target").applied({"unknown": {"frame": "known", "target": "known"}})
+    {'unknown': {'frame': 'known', 'target': 'unknown'}}
     """
 
     argument: str
@@ -66,7 +68,9 @@ class Remedy:
             raise ArgumentError(f"{self.argument}: the remedy states no value; state it yourself")
         before = arguments.get(self.argument)
         value = self.value
-        if self.argument in _SEVERAL and before is not None:
+        if isinstance(before, Mapping):  # `unknown`, where each set has a word
+            value = {**before, **dict.fromkeys(_listed(value), "unknown")}
+        elif self.argument in _SEVERAL and before is not None:
             kept = [each for each in _listed(before) if not self._replaces(each)]
             several = tuple(dict.fromkeys((*kept, *_listed(value))))
             value = several if len(several) > 1 else value

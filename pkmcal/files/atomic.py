@@ -9,7 +9,6 @@ from collections.abc import Iterable
 from os import PathLike
 from pathlib import Path
 
-from pkmcal import arguments
 from pkmcal.exceptions import MissingFileError
 
 _PART = ".pkmcal-{}.part"  # short: a name may be as long as the file system allows
@@ -57,7 +56,10 @@ def write_pieces(path: str | PathLike[str], pieces: Iterable[bytes]) -> None:
     OSError
         As of `write_whole`.
     """
-    path = arguments.path("path", path)
+    if not isinstance(path, Path):
+        from pkmcal import arguments  # it imports NumPy, which the window's server does without
+
+        path = arguments.path("path", path)
     place = Path(os.path.realpath(path))
     if not place.parent.is_dir():
         raise MissingFileError(f"{path}: the folder {place.parent} does not exist")

@@ -32,6 +32,7 @@ from pkmcal.files.header import Header, find_header, parted
 from pkmcal.files.number_text import Signs, decimals, plain, thousands, undecided
 from pkmcal.files.reading import LONGEST_NAME, MOST_CELLS, MOST_COLUMNS
 from pkmcal.files.text_rows import is_number, text_rows
+from pkmcal.files.understood import Understood
 from pkmcal.files.xlsx_rows import xlsx_rows
 
 _UNSEEN = ("-", "--", "---", "n/a", "na", "nan", "null", "none", "#n/a", "?")
@@ -132,6 +133,8 @@ class Table:
         self._header_line = header.line
         self._units = dict(header.units)
         self.left_out: tuple[str, ...] = ()  # headings of unknown columns
+        self._forgotten: list[Column] = []
+        self._units_taken: dict[str, tuple[str, str]] = {}  # of columns, and where each is stated
         self._default_units = dict(default_units or {})
         self.notes, self.elsewhere = [*text.notes, *header.notes], list[str]()
         names = header.headings
@@ -201,12 +204,28 @@ class Table:
 
     def leave_out(self, names: Collection[str]) -> None:
         """Forget columns that are not looked at."""
+        self._forgotten += [self.columns[name] for name in names if name in self.columns]
         self.columns = {n: column for n, column in self.columns.items() if n not in names}
 
     def take(self, rows: Sequence[int]) -> None:
         """Keep these rows, in this order."""
         self.lines = [self.lines[row] for row in rows]
         self.columns = {name: column.take(rows) for name, column in self.columns.items()}
+
+    def understood(self) -> tuple[Understood, ...]:
+        """What was made of each column: those that are read, then those that are left out."""
+        read = [(name, each) for name, each in self.columns.items()]
+        found = []
+        for meaning, column in [*read, *((None, each) for each in self._forgotten)]:
+            unit, stated = self._units_taken.get(meaning or "", (None, ""))
+            found.append(
+                Understood(column.name, meaning, unit, stated, column.place, column.heading)
+            )
+        return tuple(found)
+
+    def take_over(self, other: Table) -> None:
+        """Have the columns that were left out of another table among those of this one."""
+        self._forgotten += other._forgotten
 
     def put(self, name: str, column: Column) -> None:
         """Add a column, of another table or made here, with a cell for each row."""
@@ -317,7 +336,10 @@ class Table:
             other = self.columns[like].name
             self.note(f"column {column.name!r} has no unit, taken as [{unit}] like {other!r}")
             column = replace(column, unit=unit)
-        quantity, (times, over) = self._conversion(column, quantities, expected)
+            self._units_taken[name] = unit, other
+        elif column.unit:
+            self._units_taken[name] = column.unit, "heading"
+        quantity, (times, over) = self._conversion(name, column, quantities, expected)
         values = np.empty(len(self))
         signs = self._signs(name, column)
         for row, cell in enumerate(column.cells):
@@ -342,7 +364,7 @@ class Table:
         return np.stack(columns, axis=1)
 
     def _conversion(
-        self, column: Column, quantities: tuple[str, ...], expected: str | None
+        self, name: str, column: Column, quantities: tuple[str, ...], expected: str | None
     ) -> tuple[str, tuple[float, float]]:
         known = {unit: q for q in reversed(quantities) for unit in units.factors(q)}
         usual = ", ".join(
@@ -353,7 +375,7 @@ class Table:
         if not column.unit and "1" in quantities:
             return "1", (1.0, 1.0)
         column_unit = {"rad": "deg"}.get(quantities[0], quantities[0])
-        stated = column.unit or self._stated(column, (expected,) if expected else quantities)
+        stated = column.unit or self._stated(name, column, (expected,) if expected else quantities)
         if not stated:
             raise self.header_error(
                 f"column {column.name!r} has no unit: expected '{column.name} [{quantities[0]}]'"
@@ -368,17 +390,19 @@ class Table:
             )
         return known[unit], units.factors(known[unit])[unit]
 
-    def _stated(self, column: Column, quantities: tuple[str, ...]) -> str | None:
+    def _stated(self, name: str, column: Column, quantities: tuple[str, ...]) -> str | None:
         """The unit of a column without one, as the file or the caller states it for all."""
         of = [q for q in quantities if q in self._default_units or q in column.stated]
         if len(of) != 1:
             return None
         what = {"mm": "lengths", "rad": "angles"}.get(of[0], of[0])
         if of[0] in self._default_units:
+            self._units_taken[name] = self._default_units[of[0]], "options"
             return self._default_units[of[0]]
         unit, line = column.stated[of[0]]
         where = f"line {line}" if column.place == str(self.path) else f"{column.place}, line {line}"
         self.note(f"{what} without a unit in {unit}, as {where} states")
+        self._units_taken[name] = unit, f"line {line}"
         return unit
 
     def note(self, text: str) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.estimation import misfits
+from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.estimate import Estimate
 from pkmcal.estimation.estimator import LEAST_FREEDOM, Estimator
 from pkmcal.estimation.evaluation import Evaluation
@@ -136,6 +137,21 @@ def draw(data: FitData, holdout: float) -> tuple[FitData, FitData]:
     return data.select(kept), data.select(out)
 
 
+def unfitted(
+    held: Sequence[tuple[FitData, int]],
+    estimator: Estimator,
+    estimate: Estimate,
+    uncertainty: Uncertainty,
+) -> tuple[Later, Equations, tuple[Evaluation, Evaluation], OwnNumbers | None]:
+    """Rows that were not fitted, their equations, and these before and after the calibration."""
+    rows = later(estimator.equations.parameters, held)
+    whole = rows.equations(estimator.equations)
+    before = whole.with_exact_actuators().start(rows.at(estimator.start.theta), rows.own)
+    equations, after, own = compared(rows, whole, estimate, uncertainty, before.begun)
+    rows = replace(rows, parameters=equations.parameters)  # their own frames have been laid
+    return rows, equations, (before, after), own
+
+
 def evaluate(
     held: Sequence[tuple[FitData, int]],
     estimator: Estimator,
@@ -153,11 +169,7 @@ def evaluate(
     """
     if not held:
         return HeldOut()
-    rows = later(estimator.equations.parameters, held)
-    whole = rows.equations(estimator.equations)
-    before = whole.with_exact_actuators().start(rows.at(estimator.start.theta), rows.own)
-    equations, after, own = compared(rows, whole, estimate, uncertainty, before.begun)
-    rows = replace(rows, parameters=equations.parameters)  # their own frames have been laid
+    rows, equations, (before, after), own = unfitted(held, estimator, estimate, uncertainty)
     named = labels(equations)
     seen = points(rows, equations, after, named, own, uncertainty)
     row, count = named.row, len(equations.table.rows)

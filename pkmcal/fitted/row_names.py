@@ -27,25 +27,39 @@ def row_names(datasets: Sequence[FitData], rows: Iterable[int]) -> str:
             whole[key] = whole.get(key, 0) + 1
     for row in named:
         data, i = where[row]
-        measured = data.measured
-        if measured.group is not None:
-            count = whole[id(data), int(measured.group[i])]
-            if count > _MOST:
-                file = f" of {printable(measured.file)}" if measured.file else ""
-                places.setdefault(f"pose {measured.group[i]}{file} ({count} rows)", [])
-                continue
-        if measured.lines is None:
-            place = f"row {row}"
-        else:
-            file = f"{printable(measured.file)} " if measured.file else ""
-            place = f"{file}line {measured.lines[i]}"
-        if measured.group is not None:
-            place += f", pose {measured.group[i]}"
-        targets = places.setdefault(place, [])
-        if measured.target_names is not None and measured.target_index is not None:
-            targets.append(printable(measured.target_names[measured.target_index[i]]))
+        group = data.measured.group
+        if group is not None and (count := whole[id(data), int(group[i])]) > _MOST:
+            file = f" of {printable(data.measured.file)}" if data.measured.file else ""
+            places.setdefault(f"pose {group[i]}{file} ({count} rows)", [])
+            continue
+        targets = places.setdefault(_place(data, i), [])
+        targets += _target(data, i)
     listed = [
         f"{place} ({', '.join(targets)})" if targets else place for place, targets in places.items()
     ]
     more = f" and {len(listed) - _MOST} more" if len(listed) > _MOST else ""
     return ", ".join(listed[:_MOST]) + more
+
+
+def name_of(data: FitData, i: int) -> str:
+    """Name the row in place `i` of a set, as `row_names` names one alone."""
+    targets = _target(data, i)
+    return f"{_place(data, i)} ({targets[0]})" if targets else _place(data, i)
+
+
+def _place(data: FitData, i: int) -> str:
+    """Line of a file, or number of the row, and its pose."""
+    measured = data.measured
+    place = f"row {data.rows[i]}"
+    if measured.lines is not None:
+        file = f"{printable(measured.file)} " if measured.file else ""
+        place = f"{file}line {measured.lines[i]}"
+    return place if measured.group is None else f"{place}, pose {measured.group[i]}"
+
+
+def _target(data: FitData, i: int) -> list[str]:
+    """The name of the target that a row measured, if it has one."""
+    measured = data.measured
+    if measured.target_names is None or measured.target_index is None:
+        return []
+    return [printable(measured.target_names[measured.target_index[i]])]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Generic
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.effects.expansion import stated
+from pkmcal.estimation.fit_data import FitData
 from pkmcal.fitted.datum import NO_DATUM, Datum
 from pkmcal.fitted.distances import Distances
 from pkmcal.fitted.fit import Fit
@@ -194,6 +195,8 @@ class Solution(HeldOut, Generic[Machine]):
         Rows that were left out, by their numbers.
     dropped_names : str
         These rows by lines of files, poses and targets.
+    dropped_data : tuple of (FitData, int)
+        Their measurements, each set with the number of the fitted one that it is like.
     slack : tuple of SlackCable
         Readings of cables that the others show to be slack, the longest first: left out, or
         fitted.
@@ -255,6 +258,7 @@ class Solution(HeldOut, Generic[Machine]):
     datum: Datum = NO_DATUM
     dropped: tuple[int, ...] = ()
     dropped_names: str = ""
+    dropped_data: tuple[tuple[FitData, int], ...] = ()
     slack: tuple[SlackCable, ...] = ()
 
     @property

@@ -152,8 +152,6 @@ def _rows(
     if job.tracker is not None:
         tracker = read_tracker(job.tracker)
         measured = [_seen_by(tracker, each) for each in measured]
-    if job.drop and job.drop_outliers:
-        raise ArgumentError("--drop names rows, --drop-outliers finds them: one of the two")
     named: Sequence[str] = job.drop
     if isinstance(held, Measurements):
         named, held = without_lines(named, held, measured, tell)

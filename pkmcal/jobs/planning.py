@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -39,15 +40,30 @@ _RINGS = 8  # of places on the bed
 DRAWN, _SHARE = 500, 0.9  # candidates where none are given, and how far out they reach
 
 
-def run(job: Planning, machine: Robot | SerialArm, inputs: Inputs) -> Plan:
-    """Choose the poses of a plan.
+@dataclass(frozen=True)
+class Sources:
+    """What was read of a plan.
+
+    Attributes
+    ----------
+    robot : Robot or SerialArm
+        The machine, within where it is to stay.
+    poses, targets : ndarray or None
+        Candidates, and poses where accuracy counts, of files: (N, 6), or an arm's joints (N, n).
+    """
+
+    robot: Robot | SerialArm
+    poses: FloatArray | None
+    targets: FloatArray | None
+
+
+def run(job: Planning, inputs: Inputs) -> Plan:
+    """Read the files of a plan and choose its poses.
 
     Parameters
     ----------
     job : Planning
         What is asked for.
-    machine : Robot or SerialArm
-        As `machine` gives it.
     inputs : Inputs
         Reads the files, each once.
 
@@ -56,11 +72,25 @@ def run(job: Planning, machine: Robot | SerialArm, inputs: Inputs) -> Plan:
     ValueError
         An option that says nothing of this machine, or of what is measured.
     """
+    return planned(job, read(job, inputs))
+
+
+def read(job: Planning, inputs: Inputs) -> Sources:
+    """Read machine, candidates and targets."""
+    robot: Robot | SerialArm = load(inputs.robot(job.robot))
+    box = _box(robot, job.within)
+    if isinstance(robot, Robot):
+        robot = yielding(robot.within(box), job.compliance)
+    poses = None if job.poses is None else _places(robot, inputs.file(job.poses))
+    targets = None if job.targets is None else _places(robot, inputs.file(job.targets))
+    return Sources(robot, poses, targets)
+
+
+def planned(job: Planning, sources: Sources) -> Plan:
+    """Choose the poses of a plan whose files have been read."""
+    machine = sources.robot
     seen = as_machine(machine)
     free = free_names(seen, job.free)
-    box = _box(machine, job.within)
-    places = None if job.poses is None else _places(machine, inputs.file(job.poses))
-    used = None if job.targets is None else _places(machine, inputs.file(job.targets))
     kinds = kinds_of(job)
     several = isinstance(kinds, dict)
     pictures = planned_camera(job) if kinds == "pixel" else None
@@ -69,10 +99,10 @@ def run(job: Planning, machine: Robot | SerialArm, inputs: Inputs) -> Plan:
     payloads = [] if job.payloads is None else job.payloads.split(",")
     return plan_poses(
         machine,
-        _candidates(job, machine, box) if places is None else places,
+        _candidates(job, machine) if sources.poses is None else sources.poses,
         count=30 if job.count is None and job.accuracy is None and not several else job.count,
         accuracy=job.accuracy,
-        targets=used,
+        targets=sources.targets,
         criterion=word("--criterion", job.criterion, CRITERIA),
         kind=kinds if pictures is None else pictures,
         target=_points(job.target, kinds),
@@ -85,13 +115,6 @@ def run(job: Planning, machine: Robot | SerialArm, inputs: Inputs) -> Plan:
         prior=read_prior(job.prior, seen, free),
         unknown=[word("--unknown", each, UNKNOWN) for each in job.unknown],
     )
-
-
-def machine(job: Planning, inputs: Inputs) -> Robot | SerialArm:
-    """The machine of a plan, within where it is to stay."""
-    found: Robot | SerialArm = load(inputs.robot(job.robot))
-    box = _box(found, job.within)
-    return yielding(found.within(box), job.compliance) if isinstance(found, Robot) else found
 
 
 def files(job: Planning) -> list[str]:
@@ -207,9 +230,11 @@ def _box(machine: Robot | SerialArm, given: Sequence[str]) -> Box:
     return box
 
 
-def _candidates(job: Planning, machine: Robot | SerialArm, box: Box) -> FloatArray:
+def _candidates(job: Planning, machine: Robot | SerialArm) -> FloatArray:
     """Poses to choose from, where no file states them."""
-    return _on_bed(machine) if job.kind == PROBE else _drawn(machine, box, job.seed)
+    if job.kind == PROBE:
+        return _on_bed(machine)
+    return _drawn(machine, _box(machine, job.within), job.seed)
 
 
 def _on_bed(machine: Robot | SerialArm) -> FloatArray:

@@ -1,7 +1,8 @@
 """A project file: what a window or a folder asks for, as plain TOML.
 
 It says what the options of the verbs say, in tables: ``machine``, ``measured`` and ``fit`` of a
-calibration, ``plan`` of poses to measure.
+calibration, ``plan`` of poses to measure, ``import`` of the configuration that the machine is made
+of, ``export`` with the controllers that it is written for.
 """
 
 from __future__ import annotations
@@ -13,12 +14,13 @@ from typing import Any, NoReturn
 
 from pkmcal.exceptions import FileError
 from pkmcal.jobs.calibration import Calibration
+from pkmcal.jobs.configuration import Importing
 from pkmcal.jobs.plan import Planning
-from pkmcal.jobs.stated import Refuse, refused
+from pkmcal.jobs.stated import Refuse, of, refused
 
 VERSION = 1
 _VERSION = "pkmcal-project"
-_TABLES = ("machine", "measured", "fit", "plan")
+_TABLES = ("machine", "measured", "fit", "plan", "import", "export")
 _ESCAPES = {'"': '\\"', "\\": "\\\\", "\n": "\\n", "\t": "\\t", "\r": "\\r"}
 
 
@@ -32,6 +34,10 @@ class Project:
         The tables machine, measured and fit.
     plan : Planning
         The table plan; its machine is that of the calibration.
+    importing : Importing or None
+        The table import: of which configuration the machine is made.
+    targets : tuple of str
+        What the calibrated machine is written for: `as` of the table export.
 
     Examples
     --------
@@ -53,13 +59,23 @@ class Project:
 
     calibration: Calibration = field(default=Calibration())
     plan: Planning = field(default=Planning())
+    importing: Importing | None = None
+    targets: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "plan", replace(self.plan, robot=self.calibration.robot))
 
     def table(self) -> dict[str, Any]:
         """What the file says, in plain values."""
-        return {_VERSION: VERSION, **self.calibration.table(), **self.plan.table()}
+        importing = {} if self.importing is None else self.importing.table()
+        targets = {"export": {"as": list(self.targets)}} if self.targets else {}
+        return {
+            _VERSION: VERSION,
+            **self.calibration.table(),
+            **self.plan.table(),
+            **importing,
+            **targets,
+        }
 
     @classmethod
     def of_table(cls, table: Mapping[str, Any], refuse: Refuse | None = None) -> Project:
@@ -77,7 +93,15 @@ class Project:
         for key in table:
             if key not in (_VERSION, *_TABLES):
                 refuse(key, f"unknown key {key!r} of a project")
-        return cls(Calibration.of_table(table, refuse), Planning.of_table(table, refuse))
+        targets, refuse_target = of(table, "export", refuse)
+        if targets.keys() - {"as"} or not _texts(targets.get("as", [])):
+            refuse_target("as", f"must be a list of controllers alone, found {dict(targets)!r}")
+        return cls(
+            Calibration.of_table(table, refuse),
+            Planning.of_table(table, refuse),
+            Importing.of_table(table, refuse) if "import" in table else None,
+            tuple(targets.get("as", [])),
+        )
 
     def text(self) -> str:
         """The file."""
@@ -107,7 +131,13 @@ class Project:
     def in_folder(self, folder: str | Path) -> Project:
         """The same with its relative paths below a folder."""
         folder = str(folder)
-        return Project(self.calibration.in_folder(folder), self.plan.in_folder(folder))
+        importing = None if self.importing is None else self.importing.in_folder(folder)
+        calibration, plan = self.calibration.in_folder(folder), self.plan.in_folder(folder)
+        return Project(calibration, plan, importing, self.targets)
+
+
+def _texts(value: object) -> bool:
+    return isinstance(value, list) and all(isinstance(each, str) for each in value)
 
 
 def toml(table: Mapping[str, Any]) -> str:

@@ -124,6 +124,8 @@ def _put(
         f"{log.path}: {note}" for note in [*log.notes, *_not_used(log, [*actuators, *of_fields])]
     ]
     table.notes.append(said)
+    log.leave_out([name for name in log.columns if name not in (*actuators, *of_fields)])
+    table.take_over(log)
 
 
 def _is_of(name: str, field: Field) -> bool:

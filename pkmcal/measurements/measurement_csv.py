@@ -230,6 +230,7 @@ def read_measurements(
             read,
             actuator_units=units,
             notes=_notes(table),
+            understood=table.understood(),
             file=table.path.name,
             **fields,
         )
@@ -305,7 +306,8 @@ def _probed(table: Table, robot: Robot, points: FloatArray, offset: FloatArray) 
         measured = probed(robot, points, offset=offset)
         fields = _read_fields(table, measured.instrument, robot.actuator_units)
         given = {name: value for name, value in fields.items() if value is not None}
-        return replace(measured, notes=_notes(table), file=table.path.name, **given)
+        measured = replace(measured, notes=_notes(table), understood=table.understood())
+        return replace(measured, file=table.path.name, **given)
     except FileError:
         raise
     except ValueError as error:

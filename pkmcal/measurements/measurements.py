@@ -15,6 +15,7 @@ from pkmcal.arguments import checked_seed, shown, words
 from pkmcal.arrays import FloatArray, Int64Array, TextArray
 from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError
+from pkmcal.files.understood import Understood
 from pkmcal.kinematics.drive_state import DriveState
 from pkmcal.measurements.actuator_sigma import ActuatorSigma
 from pkmcal.measurements.approach import Approach
@@ -90,6 +91,8 @@ class Measurements(Result):
         The name of that file.
     notes : sequence of str
         What was assumed when they were read, a line each.
+    understood : sequence of Understood
+        What was made of each column of the file, and of the log that it was joined with.
     **fields : array_like
         One entry a row, of these:
     group : (N,) array of int, optional
@@ -149,6 +152,7 @@ class Measurements(Result):
     target_names: tuple[str, ...] | None = None
     file: str = ""
     notes: tuple[str, ...] = ()
+    understood: tuple[Understood, ...] = ()
     # fields of the rows, in the order of their columns in files
     actuator_sigma: FloatArray | None = declared(ActuatorSigma())
     sigma: FloatArray | None = declared(Sigma())
@@ -178,6 +182,7 @@ class Measurements(Result):
         instrument: Reading | None = None,
         file: str = "",
         notes: Sequence[str] = (),
+        understood: Sequence[Understood] = (),
         **fields: Any,
     ) -> None:
         of_rows = row_fields(type(self))
@@ -204,6 +209,7 @@ class Measurements(Result):
             "actuator_units": units_of_actuators(actuator_units, q.shape[1]),
             "file": file,
             "notes": words("notes", notes),
+            "understood": tuple(understood),
         })  # fmt: skip
         for each in of_rows:
             given = rowwise[each.name]
@@ -416,4 +422,13 @@ class Measurements(Result):
         yield table(self)
 
 
-_ARGUMENTS = ("kind", "target", "target_names", "actuator_units", "instrument", "file", "notes")
+_ARGUMENTS = (
+    "kind",
+    "target",
+    "target_names",
+    "actuator_units",
+    "instrument",
+    "file",
+    "notes",
+    "understood",
+)

@@ -114,7 +114,7 @@ class Design:
     def at_random(self, chosen: IntArray, draws: int) -> float:
         """Median of `predicted` over choices at random, of as many of each sort."""
         random = np.random.default_rng(0)
-        counts = np.bincount(self._sort[chosen])
+        counts = np.bincount(self._sort[chosen], minlength=1)
         drawn = []
         for _ in range(draws):
             order = random.permutation(len(self._blocks))
@@ -134,6 +134,9 @@ class Design:
     def reaching(self, error: float) -> IntArray:
         """As few candidates as predict an error (mm) that all together do."""
         error *= 1.0 + _ROUNDED
+        nothing = np.array([], dtype=np.intp)
+        if self.predicted(nothing) <= error:
+            return nothing
         found = []
         for worth in _STARTS:
             growing, chosen = self._growing(worth), list[int]()

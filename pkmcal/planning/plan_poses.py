@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pkmcal.arguments import number, whole, word
+from pkmcal.arguments import number, whole, word, words
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import BoolArray, FloatArray, IntArray, as_rows, mm_per_unit
 from pkmcal.core.library import POSE
@@ -17,16 +17,19 @@ from pkmcal.display import Table, fixed
 from pkmcal.effects.effect import Effects
 from pkmcal.effects.stated import effects_on
 from pkmcal.estimation.parameters import Parameters, Prior
-from pkmcal.exceptions import ArgumentError
+from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.geometry.carried import Load
 from pkmcal.kinematics.calibratable import Calibratable, as_machine
 from pkmcal.kinematics.perturbed import ideal
 from pkmcal.kinematics.pulled import pulled
 from pkmcal.kinematics.robot import Robot
+from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.tracker import Tracker
 from pkmcal.planning.optimal_design import CRITERIA, Criterion
 from pkmcal.planning.planned import (
     Unknown,
+    as_measured,
+    brought,
     design_of,
     equations_of,
     information,
@@ -190,6 +193,7 @@ def plan_poses(
     travel_weight: float = 0.0,
     payloads: Sequence[float | Load] = (),
     effects: Effects = (),
+    measured: Measurements | None = None,
 ) -> Plan:
     """Choose poses to measure among candidates, by exchange.
 
@@ -246,6 +250,9 @@ def plan_poses(
     effects : sequence of effects
         Those that are numbers of the machine, which the calibration is to find as well: `Sag`,
         `Elasticity`, `Harmonics`, `Coupling`, `Backlash`.
+    measured : Measurements, optional
+        Rows that are there, with their sigma: the plan is for poses beside them, `count` more, or
+        as many as lead to `accuracy`, none if they do. Read in the same frame as those to come.
 
     Returns
     -------
@@ -297,13 +304,16 @@ def plan_poses(
                 actuator_noise, load)
         for each in kinds for load in loads
     ]  # fmt: skip
-    equations = equations_of(machine, sets, free, prior, unknown, of_effects)
+    before = [] if measured is None else [_before(machine, measured, unknown)]
+    equations = equations_of(machine, [*sets, *before], free, prior, unknown, of_effects)
+    equations, of_before = equations[: len(sets)], equations[len(sets) :]
+    there = brought(of_before) if of_before else None
     parameters = equations[0].parameters
     safe = _safe(parameters, poses, q)
     rows = place.reshape(-1)[safe]
     blocks = together([information(each, len(distinct))[rows] for each in equations])
     sort = np.repeat(np.arange(len(kinds)), len(loads) * len(rows))
-    design, own_frame = design_of(parameters, blocks, sort, *aims, criterion, loads, mounted)
+    design, own_frame = design_of(parameters, blocks, sort, *aims, criterion, loads, mounted, there)
     poses, q, inside = poses[safe], q[safe], inside[safe]
     everything = design.predicted(np.arange(len(blocks)))
     if everything == 0.0 and (criterion == "prediction" or accuracy is not None):
@@ -322,9 +332,10 @@ def plan_poses(
         found = design.reaching(_accuracy(accuracy, everything, len(q)))
     ways, home = _drives(machine, q)
     places, start = _by_payload(ways, home, len(kinds), len(loads))
-    found = found[short_tour(places[found], start)[0]]
+    if len(found):
+        found = found[short_tour(places[found], start)[0]]
     unweighted = design.predicted(found), tour_length(np.vstack([home, ways[found % len(q)]]))
-    if weight:
+    if weight and len(found):
         least = np.inf if accuracy is None else max(accuracy, unweighted[0])
         found = with_travel(design, found, places, start, weight, least)[0]
     chosen = found % len(q)
@@ -349,6 +360,16 @@ def plan_poses(
         stderr=design.deviations(found) * parameters.scale,
         load=_carried(loads, found // len(q) % len(loads)),
     )
+
+
+def _before(
+    machine: Calibratable, measured: Measurements, unknown: Unknown | Sequence[Unknown]
+) -> Measurements:
+    if not isinstance(measured, Measurements):
+        raise ArgumentTypeError(f"measured must be Measurements, found {measured!r}")
+    if "target" in words("unknown", unknown):
+        raise ArgumentError("measured, unknown: rows that are there need a target that is known")
+    return as_measured(machine, measured)
 
 
 def _counts(

@@ -98,6 +98,37 @@ def planned(
     return replace(measured, actuator_sigma=np.asarray(actuator_noise, dtype=np.float64))
 
 
+def as_measured(robot: Calibratable, measured: Measurements) -> Measurements:
+    """Rows that are there, as this machine would read them without noise.
+
+    Raises
+    ------
+    ValueError
+        Their noise is not known, a value is missing, or they state what a plan does not follow.
+    """
+    instrument = measured.instrument
+    for name in ("load", "tension", "temperature", "approach"):
+        if getattr(measured, name) is not None:
+            raise ArgumentError(f"measured: rows state {name}, which plans do not follow")
+    if needed := (*instrument.per_row, *instrument.labels):
+        raise ArgumentError(f"measured: {instrument.noun()} state {needed[0]}: plans know none")
+    if not instrument.components:
+        raise ArgumentError("measured: rows of actuators alone are not followed by plans yet")
+    if measured.sigma is None:
+        raise ArgumentError("measured: state sigma, what their noise is, as in Measurements")
+    values = measured.values.reshape(len(measured), -1)
+    if not np.isfinite(values).all():
+        first = int(np.flatnonzero(~np.isfinite(values).all(axis=1))[0])
+        raise ArgumentError(f"measured: row {first} is not read whole; select the others")
+    places = measured.target
+    if places is not None and measured.target_index is not None:
+        places = places[measured.target_index]
+    exact = VirtualMachine(robot, 0.0).measure(measured.actuators, instrument, places)
+    if not np.isfinite(exact.values).all():
+        raise ArgumentError(f"measured: at some of the rows {robot.name} has no pose")
+    return replace(measured, values=exact.values)
+
+
 def read_at(robot: Calibratable, q: FloatArray, kinds: Sequence[Kind | Reading]) -> BoolArray:
     """Poses (N,) at which every instrument reads all that it has to."""
     able = np.ones(len(q), dtype=bool)
@@ -170,15 +201,27 @@ def equations_of(
 
 def information(equations: Equations, poses: int) -> FloatArray:
     """What each pose brings (N, k, n): derivatives of its equations, whitened and scaled."""
-    equations, at = equations.begin(equations.with_exact_actuators().start())
-    rows = equations.by_parameters(at, np.ones(len(equations.blocks.unstated)))
-    rows *= equations.parameters.scale
+    equations, rows = _derivatives(equations)
     block_of_row = equations.blocks.block_of_row
     first = np.arange(0, len(block_of_row), len(block_of_row) // poses)
     if not equations.machines.unknowns:  # rows are blocks, in their order
         return compressed(rows.reshape(poses, -1, rows.shape[1]))
     units: FloatArray = rows.reshape(len(equations.blocks.components), -1, rows.shape[1])
     return units[block_of_row[first]]
+
+
+def brought(equations: Sequence[Equations]) -> FloatArray:
+    """What all rows of some sets bring together (p, n), as `information` of poses has it."""
+    rows = [_derivatives(each)[1] for each in equations]
+    return np.asarray(np.linalg.qr(np.vstack(rows), mode="r"), dtype=np.float64)
+
+
+def _derivatives(equations: Equations) -> tuple[Equations, FloatArray]:
+    """Equations at their start, and their rows by the parameters, whitened and scaled."""
+    equations, at = equations.begin(equations.with_exact_actuators().start())
+    rows = equations.by_parameters(at, np.ones(len(equations.blocks.unstated)))
+    rows *= equations.parameters.scale
+    return equations, rows
 
 
 def compressed(blocks: FloatArray) -> FloatArray:
@@ -206,10 +249,12 @@ def design_of(
     criterion: Criterion,
     loads: Sequence[Load | None] = (None,),
     mounted: bool = False,
+    there: FloatArray | None = None,
 ) -> tuple[Design, bool]:
     """The design, and whether its errors, under each load, are in the machine's own frame.
 
     `mounted`: what is on the platform has to be found, so that its frame is the machine's own, too.
+    `there` (p, n) is what rows that are measured already bring.
     """
     k = len(chosen.places)
     machines = [under(chosen.robot, load) for load in loads]
@@ -224,6 +269,8 @@ def design_of(
 
     def design(aimed: FloatArray) -> Design:
         rows = chosen.prior_rows(chosen.start)
+        if there is not None:
+            rows = np.vstack([rows, there])
         return Design(blocks, rows, aimed, criterion, chosen.robot.length, sort)
 
     made = design(aimed)

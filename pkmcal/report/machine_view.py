@@ -12,15 +12,13 @@ import numpy as np
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray
 from pkmcal.calibration.identification import Identification
-from pkmcal.fitted.row_names import row_names
 from pkmcal.kinematics.calibratable import as_given
 from pkmcal.kinematics.robot import Robot
 from pkmcal.report.drawing import sample
 from pkmcal.report.exaggerated import middle_exaggerated
-from pkmcal.report.residual_vectors import measured_places, residual_vectors
+from pkmcal.report.rows import rows
 from pkmcal.view import page, parallel
 
-_NAMED = 100  # outliers, which have the names of their lines; others have numbers
 _MORE = 10  # times the exaggeration that is drawn at first
 _POSES = 200  # measured poses that can be visited
 
@@ -34,37 +32,32 @@ def element(found: Identification) -> tuple[str, str]:
     if isinstance(robot, Robot) and parallel.beyond(robot.model):
         return "", ""
     data = page.machine(robot, cloud=False)  # the report has its own pictures of the workspace
-    data["places"] = _measured(found)
-    data["calibration"] = {"points": _points(found), "change": _change(found)}
+    data["places"] = measured_poses(found)
+    data["calibration"] = {"points": _points(found), "change": change(found)}
     return page.plain_element(data)
 
 
 def _points(found: Identification) -> list[dict[str, Any]]:
-    before, after = (residual_vectors(found, at) for at in (found.fit.start, found.fit.end))
-    places = measured_places(found)
-    odd = np.isin(found.rows, found.outliers)
-    drawn = sample(len(places), odd)
-    names = found.fit.equations.prediction.datasets
-    named = {int(row): row_names(names, [row]) for row in found.outliers[:_NAMED]}
+    listed = rows(found)
     points = []
-    for k in drawn:
-        numbers = np.concatenate([places[k], before[k], after[k]])
+    fitted = np.array([use == "fitted" for use in listed.use])
+    for k in sample(int(fitted.sum()), listed.outlier[fitted]):
+        numbers = np.concatenate([listed.at[k], listed.before[k], listed.after[k]])
         if not np.isfinite(numbers).all():
             continue
-        row = int(found.rows[k])
         points.append(
             {
-                "name": named.get(row, f"row {row}"),
-                "at": places[k].round(3).tolist(),
-                "before": [float(f"{x:.5g}") for x in before[k]],
-                "after": [float(f"{x:.5g}") for x in after[k]],
-                "outlier": bool(odd[k]),
+                "name": listed.name[k] if listed.outlier[k] else f"row {listed.row[k]}",
+                "at": listed.at[k].round(3).tolist(),
+                "before": [float(f"{x:.5g}") for x in listed.before[k]],
+                "after": [float(f"{x:.5g}") for x in listed.after[k]],
+                "outlier": bool(listed.outlier[k]),
             }
         )
     return points
 
 
-def _measured(found: Identification) -> dict[str, Any]:
+def measured_poses(found: Identification) -> dict[str, Any]:
     """The measured poses as the identified machine has them, with their actuators."""
     end = found.fit.end
     reached = np.flatnonzero(np.isfinite(end.pose).all(axis=1) & (end.status == 0))
@@ -75,7 +68,7 @@ def _measured(found: Identification) -> dict[str, Any]:
     return page.places(name, found.robot, end.pose[chosen], q)
 
 
-def _change(found: Identification) -> dict[str, Any]:
+def change(found: Identification) -> dict[str, Any]:
     """Numbers of the machine that changed, as the core has them, before and after.
 
     None of a machine with drive laws, whose numbers are not in the memory of the page's core: there

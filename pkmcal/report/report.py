@@ -22,7 +22,7 @@ from pkmcal.report.as_json import as_json
 from pkmcal.report.axes import axes
 from pkmcal.report.certificate import Statement
 from pkmcal.report.places import in_the_workspace
-from pkmcal.view import page
+from pkmcal.view import scripts
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -156,7 +156,7 @@ def html(facts: Mapping[str, Any]) -> str:
     }
     view, digest = machine_view.element(facts["found"])
     parts = {"figures": figures, "view": Markup(view), "view_digest": digest}
-    style = Markup(page.style())
+    style = Markup(scripts.style())
     return environment.get_template(_TEMPLATE).render(**facts, **parts, view_style=style)
 
 

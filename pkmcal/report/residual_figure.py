@@ -119,14 +119,17 @@ def _over_the_workspace(panel: Axes, found: Identification, drawn: IntArray) -> 
 
     Where nothing but angles was read their size is the colour, and where nothing was, the closures.
     """
-    vectors, label = residual_vectors(found, found.fit.end), "z [mm]"
+    vectors, label = residual_vectors(found.fit.equations, found.fit.end), "z [mm]"
     sizes = not np.isfinite(vectors).any()
     if sizes:
         vectors, label = _without_direction(found)
     odd = np.isin(found.rows, found.outliers)
     vectors = vectors[drawn]
     read = np.isfinite(vectors).all(axis=1)
-    (x, y), odd = measured_places(found)[drawn][read, :2].T, odd[drawn][read]
+    (x, y), odd = (
+        measured_places(found.fit.equations, found.fit.end)[drawn][read, :2].T,
+        odd[drawn][read],
+    )
     dx, dy, colour = vectors[read].T
     usual = ~odd if (~odd).any() else np.ones(len(odd), dtype=bool)
     most = max(float(np.abs(colour[usual]).max(initial=0.0)), 1e-12)

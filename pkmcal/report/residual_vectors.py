@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from pkmcal.arrays import FloatArray
-from pkmcal.calibration.identification import Identification
 from pkmcal.core import instruments
+from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.evaluation import Evaluation
 
 
-def residual_vectors(found: Identification, at: Evaluation) -> FloatArray:
+def residual_vectors(equations: Equations, at: Evaluation) -> FloatArray:
     """Residuals of all rows as vectors in the robot's base frame, mm (N, 3).
 
     Of the components that were read; NaN where none was, and of readings that are angles alone.
@@ -18,7 +18,6 @@ def residual_vectors(found: Identification, at: Evaluation) -> FloatArray:
     the twist: unit vectors of the instrument's axes, of a height's axis or along a distance.
     """
     parts = []
-    equations = found.fit.equations
     every = zip(equations.table.sets, at.residuals, equations.prediction.predicted(at), strict=True)
     for measured, residual, seen in every:
         lengths = [k for k, unit in enumerate(measured.units) if unit == "mm"]
@@ -29,9 +28,8 @@ def residual_vectors(found: Identification, at: Evaluation) -> FloatArray:
     return np.concatenate(parts)
 
 
-def measured_places(found: Identification) -> FloatArray:
+def measured_places(equations: Equations, end: Evaluation) -> FloatArray:
     """Where the measured points of all rows are in the robot's base frame, mm (N, 3)."""
-    equations, end = found.fit.equations, found.fit.end
     parts = []
     for i in range(len(equations.table.sets)):
         target = equations.prediction.arguments_of(i, end.theta).get("target")

@@ -9,9 +9,7 @@ from __future__ import annotations
 import json
 import zlib
 from base64 import b64encode
-from functools import cache
 from hashlib import sha256
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
@@ -22,9 +20,8 @@ from pkmcal.display import printable
 from pkmcal.kinematics.robot import Robot
 from pkmcal.screw import to_pose
 from pkmcal.view import parallel, serial
+from pkmcal.view.scripts import MODULES, resource, scripts, style
 
-_SCRIPTS = ("algebra", "core", "laws", "mover", "arm", "limits", "bodies", "scene", "panel")
-_MODULES = {"limbs": "limbs", "chains": "chains", "arm": "arms"}
 _DIGITS = 3  # of the ends of the cloud, mm
 
 
@@ -103,7 +100,7 @@ def _more(data: dict[str, Any]) -> list[str]:
 
 
 def _given(data: dict[str, Any]) -> str:
-    module = _resource(f"wasm/{_MODULES[data['kind']]}.wasm")
+    module = resource(f"wasm/{MODULES[data['kind']]}.wasm")
     return as_script({**data, "wasm": packed(module)})
 
 
@@ -118,26 +115,6 @@ def packed(content: bytes) -> str:
     return b64encode(zlib.compress(content, 9)).decode()
 
 
-@cache
-def style() -> str:
-    """The style sheet of the element."""
-    return _squeezed(_text("page/view.css"))
-
-
-@cache
-def scripts(*more: str) -> str:
-    """All scripts of the element, one after the other: the body of a function of root and data."""
-    names = [*_SCRIPTS, *more, "start"]
-    body = "\n".join(_squeezed(_text(f"page/{name}.js")) for name in names)
-    return f"'use strict'\n{body}\nreturn start(root, data)"
-
-
-def _squeezed(text: str) -> str:
-    """Without indentation, empty lines, and lines that are a comment."""
-    lines = (line.strip() for line in text.splitlines())
-    return "\n".join(line for line in lines if line and not line.startswith(("//", "/*")))
-
-
 def _cloud(points: FloatArray) -> dict[str, Any] | None:
     """Points (N, 3), mm, as 16-bit numbers between their ends."""
     if len(points) < 2:
@@ -147,12 +124,3 @@ def _cloud(points: FloatArray) -> dict[str, Any] | None:
     whole = np.rint((points - low) / step).astype("<u2")
     rounded = (np.round(low, _DIGITS).tolist(), step.tolist())
     return {"low": rounded[0], "step": rounded[1], "points": packed(whole.tobytes())}
-
-
-def _text(name: str) -> str:
-    return _resource(name).decode()
-
-
-@cache
-def _resource(name: str) -> bytes:
-    return files("pkmcal.view").joinpath(name).read_bytes()

@@ -152,7 +152,8 @@ def _act(it: Controller, command: str, state: dict, home: dict, version: int) ->
         for axis in "XYZ":
             if axis in words:
                 it.shift[axis] = it.at[axis] - words[axis]
-        it.extruder = words.get("E", it.extruder)
+        if "E" in words:  # as XYZ it is in the unit of the program, from firmware 2 on
+            it.extruder = words["E"] * (25.4 if state["inch"] else 1.0)
         if not words:
             raise Odd("G92 alone")
     elif name == "G28":

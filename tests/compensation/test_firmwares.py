@@ -128,19 +128,23 @@ def followed(text: str, firmware: str, folder: Path, start: bool, joints: bool) 
     return True
 
 
+PART = 1000  # programs of a slow test: 10 000 in parts that can be run alone
 CASES = [
-    pytest.param(40, id="quick"),
-    pytest.param(10_000, id="many", marks=pytest.mark.slow),
+    pytest.param(range(40), id="quick"),
+    *(
+        pytest.param(range(first, first + PART), id=f"from {first}", marks=pytest.mark.slow)
+        for first in range(0, 10_000, PART)
+    ),
 ]
 
 
-@pytest.mark.parametrize("count", CASES)
+@pytest.mark.parametrize("seeds", CASES)
 @pytest.mark.parametrize("firmware", READS)
 def test_the_machine_goes_where_the_program_meant(
-    firmware: str, count: int, tmp_path: Path
+    firmware: str, seeds: range, tmp_path: Path
 ) -> None:
     """Usual programs are all taken."""
-    for seed in range(count):
+    for seed in seeds:
         rng = random.Random(f"{firmware} {seed}")
         joints = firmware == "linuxcnc" and seed % 3 == 0
         text = generated_programs.program(firmware, rng, joints=joints)
@@ -162,6 +166,12 @@ def test_each_word_is_corrected_or_refused(firmware: str, tmp_path: Path) -> Non
                     raise AssertionError(f"{word!r}: {wrong!r}") from wrong
 
 
+@pytest.mark.parametrize("firmware", ["marlin", "reprap"])
+def test_filament_that_begins_anew_in_inches_is_in_inches(firmware: str, tmp_path: Path) -> None:
+    text = "G28\nG20\nG90\nM82\nG92 E0\nG1 X0 Y0 Z1.5 F60\nG92 E4\nG1 X1 Y0.4 E4.1\nG1 X0 E4.2\n"
+    assert followed(text, firmware, tmp_path, True, False)
+
+
 @pytest.mark.parametrize("firmware", ["marlin", "reprap", "klipper"])
 def test_filament_is_as_meant_after_any_order_of_modes(firmware: str, tmp_path: Path) -> None:
     orders = list(product(("G90", "G91", "M82", "M83"), repeat=3))
@@ -172,14 +182,14 @@ def test_filament_is_as_meant_after_any_order_of_modes(firmware: str, tmp_path: 
     assert sum(taken) > 0.2 * len(orders)
 
 
-@pytest.mark.parametrize("count", CASES)
+@pytest.mark.parametrize("seeds", CASES)
 @pytest.mark.parametrize("firmware", READS)
 def test_what_means_something_else_is_corrected_or_refused(
-    firmware: str, count: int, tmp_path: Path
+    firmware: str, seeds: range, tmp_path: Path
 ) -> None:
     """With words in any place that move the origin, other axes, otherwise, or nothing."""
     taken = 0
-    for seed in range(count):
+    for seed in seeds:
         rng = random.Random(f"odd {firmware} {seed}")
         joints = firmware == "linuxcnc" and seed % 3 == 0
         text = generated_programs.program(firmware, rng, rng.choice([1, 1, 2, 3]), joints)
@@ -187,4 +197,4 @@ def test_what_means_something_else_is_corrected_or_refused(
             taken += followed(text, firmware, tmp_path, rng.random() < 0.5, joints)
         except (AssertionError, Odd) as wrong:
             raise AssertionError(f"seed {seed}: {wrong!r}\n{text}") from wrong
-    assert taken > 0.05 * count
+    assert taken > 0.05 * len(seeds)

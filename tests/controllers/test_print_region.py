@@ -99,3 +99,20 @@ def test_a_bed_of_unknown_size_is_asked_for(run: Any, refused: Any, tmp_path: Pa
     assert "--within radius=" in refused("plan", "2tpr2tps", "--kind", "probe")
     result = run("plan", "linear-delta", "--kind", "probe", "--within", "radius=0:80")
     assert result.exit_code == 0, result.output
+
+
+def test_cranks_of_a_rotary_delta_stay_below_their_end_stops(tmp_path: Path) -> None:
+    (path := tmp_path / "rotary.cfg").write_text(
+        "[printer]\nkinematics: rotary_delta\nshoulder_radius: 180\nshoulder_height: 520\n"
+        "[delta_calibrate]\nradius: 60\n[stepper_a]\ngear_ratio: 107:16, 60:16\nmicrosteps: 16\n"
+        "position_endstop: 252\nupper_arm_length: 170\nlower_arm_length: 400\n"
+        + "".join(f"[stepper_{axis}]\ngear_ratio: 107:16, 60:16\nmicrosteps: 16\n" for axis in "bc")
+    )
+    robot = pk.import_printer(path).robot
+    assert robot.model.workspace["radius"] == (0.0, 60.0)
+    poses = np.zeros((3, 6))
+    poses[:, 2] = [0.0, 251.0, 251.0]
+    poses[2, 0] = 40.0  # away from the middle a crank would be above its end stop
+    steps = robot.inverse(poses)
+    assert (steps[:2] >= 0.0).all() and (steps[2] < 0.0).any()
+    assert robot.feasible(poses).ok.tolist() == [True, True, False]

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import hypothesis.strategies as st
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 
@@ -18,6 +19,7 @@ from pkmcal.diagnostics.check import Remedy
 from pkmcal.exceptions import ArgumentError
 from pkmcal.jobs import calibrating
 from pkmcal.jobs.calibration import Calibration, Writing
+from pkmcal.jobs.effects_option import read_effects
 from pkmcal.jobs.inputs import Inputs
 from pkmcal.jobs.project import Project
 from pkmcal.jobs.reading import Reading
@@ -189,3 +191,45 @@ found = {"numpy", "scipy", "typer"} & set(sys.modules)
 assert not found, found
 """
     subprocess.run([sys.executable, "-c", program], check=True)
+
+
+@pytest.mark.parametrize(
+    "effect",
+    [
+        pk.Sag(), pk.Sag("all"), pk.Sag((2, 3)), pk.Sag("all", tied=True), pk.Harmonics([1, 2]),
+        pk.Harmonics([200], joints=3),
+        pk.Elasticity(("offset*",)),
+    ],
+    ids=lambda effect: effect.option,
+)  # fmt: skip
+def test_an_effect_that_a_check_proposes_is_the_one_that_the_calibration_has(effect: Any) -> None:
+    job = Calibration("arm.toml", ("a.csv",)).with_remedy(Remedy("effects", (effect,)))
+    assert [each.option for each in read_effects(job.effects)] == [effect.option]
+
+
+@pytest.mark.parametrize(
+    "remedy",
+    [
+        Remedy("drop", (3, 17)), Remedy("drop", "outliers"), Remedy("loss", "cauchy"),
+        Remedy("unknown", "target"), Remedy("fix", ("offset2",)), Remedy("fix", "datum"),
+        Remedy("free", ("offset*",)),
+    ],
+    ids=str,
+)  # fmt: skip
+def test_a_remedy_is_the_argument_of_identify_that_it_names(remedy: Remedy) -> None:
+    """Beside what the calibration has: fixed and dropped rows, another loss."""
+    job = Calibration(ROBOT, (PROBE,), fix=("offset1",), drop=("5",), loss="huber")
+    sources = calibrating.read(job, Inputs(), lambda line: None)
+
+    def said(asked: Calibration) -> dict[str, Any]:
+        return calibrating.arguments(asked, sources, lambda line: None)
+
+    before, after = said(job), said(job.with_remedy(remedy))
+    wanted = {"measurements": before.pop("measurements"), **remedy.applied(before)}
+    assert after.pop("measurements") is wanted.pop("measurements")
+    found = [
+        calibrating.identified(sources, {"measurements": sources.measured[0], **each})
+        for each in (after, wanted)
+    ]
+    assert [found[0].free, found[0].dropped] == [found[1].free, found[1].dropped]
+    np.testing.assert_array_equal(found[0].values, found[1].values)

@@ -63,8 +63,7 @@ def test_a_project_holds_a_plan_of_its_machine(job: Any) -> None:
 
 def test_a_plan_is_that_of_its_options(run: Any) -> None:
     job = Planning("hexapod", kind="pose", count=8, seed=3)
-    inputs = Inputs()
-    made = planning.run(job, planning.machine(job, inputs), inputs)
+    made = planning.run(job, Inputs())
     assert run(*job.argv()[1:]).stdout == f"{made}\n"
     assert made.poses.shape == (8, 6) and isinstance(made.robot, pk.Robot)
 

@@ -58,9 +58,11 @@ def targets(found: Identification) -> np.ndarray:
 
 def test_positions_leave_vectors_as_they_are() -> None:
     found = found_from("position")
-    vectors = residual_vectors(found, found.fit.end)
+    vectors = residual_vectors(found.fit.equations, found.fit.end)
     np.testing.assert_allclose(vectors, found.residuals[0], atol=1e-12)
-    np.testing.assert_allclose(measured_places(found), targets(found), atol=1e-9)
+    np.testing.assert_allclose(
+        measured_places(found.fit.equations, found.fit.end), targets(found), atol=1e-9
+    )
 
 
 def test_vectors_of_a_tracker_somewhere_are_turned_into_the_base() -> None:
@@ -69,7 +71,7 @@ def test_vectors_of_a_tracker_somewhere_are_turned_into_the_base() -> None:
     seen = measured.values @ rotation(frame[3:]).T + frame[:3]
     away = pk.Measurements(measured.actuators, seen, kind="position", target=TARGET)
     found = pk.identify(HEXAPOD, away, free="offset*", unknown="frame")
-    vectors = residual_vectors(found, found.fit.end)
+    vectors = residual_vectors(found.fit.equations, found.fit.end)
     np.testing.assert_allclose(
         np.linalg.norm(vectors, axis=1), np.linalg.norm(found.residuals[0], axis=1), atol=1e-12
     )
@@ -79,14 +81,14 @@ def test_vectors_of_a_tracker_somewhere_are_turned_into_the_base() -> None:
 
 def test_heights_point_along_z() -> None:
     found = found_from("height")
-    vectors = residual_vectors(found, found.fit.end)
+    vectors = residual_vectors(found.fit.equations, found.fit.end)
     np.testing.assert_allclose(vectors[:, :2], 0.0, atol=1e-15)
     np.testing.assert_allclose(vectors[:, 2], found.residuals[0][:, 0], atol=1e-12)
 
 
 def test_distances_point_away_from_their_anchor() -> None:
     found = found_from("distance")
-    vectors = residual_vectors(found, found.fit.end)
+    vectors = residual_vectors(found.fit.equations, found.fit.end)
     way = targets(found) - ANCHOR
     way /= np.linalg.norm(way, axis=1, keepdims=True)
     np.testing.assert_allclose(vectors, found.residuals[0] * way, atol=1e-9)

@@ -12,7 +12,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from pkmcal.view import page
+from pkmcal.view import page, scripts
 
 from .. import browser
 
@@ -70,7 +70,7 @@ def said(
 ) -> list[list[dict[str, Any]]]:
     """Of each machine what it is at first and after each of its moves."""
     elements = "".join(page.element(page.machine(robot)) for robot in robots)
-    text = f"<!doctype html><meta charset='utf-8'><style>{page.style()}</style>{elements}"
+    text = f"<!doctype html><meta charset='utf-8'><style>{scripts.style()}</style>{elements}"
     file = folder / "machines.html"
     file.write_text(text + _DRIVER % page.as_script(moves), encoding="utf-8")
     seen = dumped(file)

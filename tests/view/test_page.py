@@ -16,7 +16,7 @@ import pytest
 import pkmcal as pk
 from pkmcal.core.library import POSE
 from pkmcal.files.seal import is_sealed
-from pkmcal.view import page
+from pkmcal.view import page, scripts
 
 from .. import driven
 from . import pages
@@ -36,7 +36,7 @@ def test_a_page_is_one_file_of_less_than_61_kb_that_asks_for_no_other(
 ) -> None:
     text = pk.show(pk.load(name), tmp_path / "page.html").read_text(encoding="utf-8")
     assert len(text.encode()) < 61_000
-    sources = text + page.scripts() + page.style()
+    sources = text + scripts.scripts() + scripts.style()
     asks = r"https?:|\bfetch\(|XMLHttp|@import|\bsrc=|\bhref=(?!.data:,)|url\("
     assert not re.search(asks, sources)
 

@@ -32,7 +32,8 @@ class Scene {
     this.context = canvas.getContext('2d')
     this.dark = matchMedia('(prefers-color-scheme: dark)')
     this.dark.addEventListener('change', redraw)
-    new ResizeObserver(redraw).observe(canvas)
+    this.observer = new ResizeObserver(redraw)
+    this.observer.observe(canvas)
     this.listen()
   }
 
@@ -263,7 +264,7 @@ class Scene {
     }
     const apart = () => { const [a, b] = [...held.values()]; return Math.hypot(a[0] - b[0], a[1] - b[1]) }
     canvas.addEventListener('pointerdown', e => {
-      this.pointed?.(e.offsetX, e.offsetY)
+      this.pointed?.(e.offsetX, e.offsetY, 1)
       held.set(e.pointerId, [e.clientX, e.clientY])
       canvas.setPointerCapture(e.pointerId)
     })

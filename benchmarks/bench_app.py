@@ -1,0 +1,124 @@
+"""What the window costs: until it listens, of a fit after a click, in bytes and memory, until Stop.
+
+python -m benchmarks.bench_app
+"""
+
+from __future__ import annotations
+
+import http.client
+import json
+import os
+import statistics
+import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+import pkmcal as pk
+from benchmarks.timing import Report
+from tests.app import browser
+
+ROUNDS = 7
+FIRST_PAGE = ("/", "/app.css", "/view.css", "/app.js", "/transport.js", "/frame.js", "/picture.js",
+              "/machine.js")  # fmt: skip
+
+
+class Asking:
+    """Requests of a page, without one."""
+
+    def __init__(self, served: browser.Served) -> None:
+        self.served = served
+
+    def __call__(self, method: str, path: str, body: Any = None) -> bytes:
+        connection = http.client.HTTPConnection("127.0.0.1", self.served.port, timeout=120)
+        text = body if isinstance(body, bytes) else json.dumps(body or {}).encode()
+        connection.request(method, path, text, {"x-pkmcal-token": self.served.token})
+        answer = connection.getresponse().read()
+        connection.close()
+        if path.startswith("/api/run/") and b'"result"' not in answer:
+            raise RuntimeError(f"{path}: {answer.decode()}")  # its time is none of a result
+        return answer
+
+    def take(self, table: dict[str, Any]) -> None:
+        version = json.loads(self("GET", "/api/state"))["version"]
+        self("POST", "/api/state", {"state": {"pkmcal-project": 1, **table}, "version": version})
+
+
+def processor_seconds(pid: int) -> float:
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def memory(pid: int) -> float:
+    line = next(each for each in Path(f"/proc/{pid}/status").read_text().splitlines()
+                if each.startswith("VmRSS"))  # fmt: skip
+    return int(line.split()[1]) / 1024
+
+
+def log(rows: int) -> bytes:
+    """Return the positions of a hexapod with errors, as a file."""
+    robot = pk.load("hexapod")
+    rng = np.random.default_rng(1)
+    true = robot.replace({f"base{i}.{x}": robot.geometry[f"base{i}.{x}"] + rng.normal(0, 0.3)
+                          for i in range(1, 7) for x in "xyz"})  # fmt: skip
+    q = robot.inverse(pk.sample_poses(robot, rows, seed=2, share=0.5))
+    m = pk.VirtualMachine(true, noise=0.02, seed=1).measure(q)
+    heads = [*(f"q{i} [mm]" for i in range(1, 7)), "x [mm]", "y [mm]", "z [mm]"]
+    lines = np.hstack([m.actuators, m.values]).tolist()
+    return "\n".join([",".join(heads), *(",".join(map(repr, line)) for line in lines)]).encode()
+
+
+def main() -> None:
+    report = Report("The window")
+    with TemporaryDirectory() as folder:
+        begin = time.perf_counter()
+        with browser.served(Path(folder) / "project") as served:
+            report.text(f"listening after {time.perf_counter() - begin:.2f} s")
+            ask = Asking(served)
+            sizes = [len(ask("GET", path)) for path in FIRST_PAGE]
+            report.text(f"first page: {sum(sizes) / 1e3:.1f} kB in {len(sizes)} requests")
+            sizes = [len(ask("GET", path)) for path in ("/view.js", "/wasm/limbs")]
+            report.text(f"scripts and core of a machine: {sum(sizes) / 1e3:.1f} kB more")
+            for rows in (180, 600, 3000):
+                ask("PUT", f"/api/file/m{rows}.csv", log(rows))
+                table = {"machine": {"builtin": "hexapod"}, "measured": {"files": [f"m{rows}.csv"]}}
+                free = ["default", "gain1", "gain2", "gain3"]
+                ask.take({**table, "fit": {"free": free}})
+                ask("POST", "/api/run/fit")
+                worker = json.loads(ask("GET", "/api/health"))["worker"]
+                seconds, wall = [], []
+                for k in range(ROUNDS):
+                    ask.take({**table, "fit": {"free": free, "drop": [str(k)]}})
+                    used, begin = processor_seconds(worker), time.perf_counter()
+                    answer = ask("POST", "/api/run/fit")
+                    seconds.append(processor_seconds(worker) - used)
+                    wall.append(time.perf_counter() - begin)
+                report.text(
+                    f"a row left out of {rows}, 45 numbers: {statistics.median(seconds):.2f} s of"
+                    f" the worker, {statistics.median(wall):.2f} s until the answer of"
+                    f" {len(answer) / 1e3:.0f} kB"
+                )
+            ask("POST", "/api/run/report")
+            report.text(
+                f"memory: server {memory(served.process.pid):.0f} MB, worker after a report"
+                f" {memory(worker):.0f} MB"
+            )
+            stops = []
+            for _ in range(ROUNDS):
+                connection = http.client.HTTPConnection("127.0.0.1", served.port, timeout=60)
+                connection.request("POST", "/api/run/wait", b"{}", {"x-pkmcal-token": served.token})
+                answer_ = connection.getresponse()
+                job = json.loads(answer_.readline())["job"]
+                answer_.readline()
+                begin = time.perf_counter()
+                ask("POST", f"/api/cancel/{job}")
+                answer_.read()
+                stops.append(time.perf_counter() - begin)
+                connection.close()
+            report.text(f"Stop: {1e3 * statistics.median(stops):.0f} ms until the answer")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,156 @@
+"""The project of a window: a folder of the user's files, and one plain file of what is asked.
+
+Nothing else is a state. The file is written whole at every change; every change has a number, so
+that of two tabs that change the same state the second is told.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pkmcal.app.names import safe_name
+from pkmcal.exceptions import ArgumentError
+from pkmcal.files.atomic import write_whole
+from pkmcal.jobs.project import Project
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib  # type: ignore[import-not-found,unused-ignore]
+
+FILE = "project.toml"
+OWN = (FILE, "robot.toml", "commands.csv")  # names that are pkmcal's; a user's file gets another
+MOST_FILE, MOST_FOLDER = 100_000_000, 1_000_000_000  # bytes
+_UNDO = 100
+
+
+class Folder:
+    """A project and its versions.
+
+    Parameters
+    ----------
+    path : Path
+        Made if it is not there. A project file in it is read.
+
+    Raises
+    ------
+    ValueError
+        A project file with a mistake, with its line.
+    """
+
+    def __init__(self, path: Path) -> None:
+        path.mkdir(parents=True, exist_ok=True)
+        self.path = path.resolve()
+        file = self.path / FILE
+        self.project = _read(file) if file.is_file() else Project()
+        self.version = 1
+        self._before: list[Project] = []
+
+    @property
+    def files(self) -> list[str]:
+        """The user's files, by name."""
+        return sorted(each.name for each in self.path.iterdir() if self._is_users(each))
+
+    def change(self, table: Mapping[str, Any], version: object) -> bool:
+        """Take a whole new state, written at once; False where another was first.
+
+        Raises
+        ------
+        ValueError
+            A key or value that is none, or a file that is not in the folder.
+        """
+        if version != self.version:
+            return False
+        project = Project.of_table(table)
+        self._inside(project)
+        if project != self.project:
+            self._before = [*self._before, self.project][-_UNDO:]
+            self._take(project)
+        return True
+
+    def undo(self, version: object) -> bool:
+        """Go back to the state before; False where there is none or another was first."""
+        if version != self.version or not self._before:
+            return False
+        self._take(self._before.pop())
+        return True
+
+    @property
+    def undoable(self) -> bool:
+        """Whether there is a state before."""
+        return bool(self._before)
+
+    def store(self, name: str, content: Path) -> str:
+        """Take a file that was sent, and return the name that it has here."""
+        name = safe_name(name)
+        if name in OWN or name.endswith(".part"):
+            name = f"my_{name}"
+        content.replace(self.path / name)
+        return name
+
+    def written(self, path: str) -> Path | None:
+        """Return a file of the folder that may be taken away, or None."""
+        if "\0" in path:
+            return None
+        found = (self.path / path).resolve()
+        if not found.is_relative_to(self.path) or not found.is_file():
+            return None
+        hidden = any(part.startswith(".") for part in found.relative_to(self.path).parts)
+        return None if hidden else found
+
+    def used(self) -> int:
+        """Bytes of all files."""
+        return sum(each.lstat().st_size for each in self.path.rglob("*") if each.is_file())
+
+    def _take(self, project: Project) -> None:
+        write_whole(self.path / FILE, project.text().encode())
+        self.project = project
+        self.version += 1
+
+    def _inside(self, project: Project) -> None:
+        """Refuse files that are not in the folder, and places to write that are not."""
+        importing = project.importing
+        made = importing.out if importing else None
+        if made is not None and _outside(made):
+            raise ArgumentError("out: a folder within this project is expected")
+        for name in _named(project):
+            below = made is not None and Path(name).parts[:1] == Path(made).parts  # not yet there
+            if _outside(name) or not (below or self.written(name) is not None):
+                raise ArgumentError(f"there is no file {json.dumps(name)} in this project")
+
+    @staticmethod
+    def _is_users(path: Path) -> bool:
+        return path.is_file() and not path.name.startswith(".") and path.name != FILE
+
+
+def _read(file: Path) -> Project:
+    """Read a project file; what says where a mistake is takes the packages that compute."""
+    text = file.read_bytes()
+    try:
+        return Project.of_table(tomllib.loads(text.decode()))
+    except ValueError:
+        return Project.of_text(text, str(file))
+
+
+def _named(project: Project) -> list[str]:
+    """Return the files that a project names, the machine's first."""
+    job, plan, importing = project.calibration, project.plan, project.importing
+    reading = job.reading
+    boards = (
+        each for each in (reading.board, plan.board) if each and each.lower().endswith(".csv")
+    )
+    configuration = (importing.file, importing.log) if importing else ()
+    machine = job.table().get("machine", {}).get("file")
+    read = (reading.controller, reading.columns, reading.camera, job.held_file)
+    others = (*read, *boards, plan.poses, plan.targets, plan.camera)
+    return [name for name in (machine, *configuration, *job.files, *others) if name]
+
+
+def _outside(path: str) -> bool:
+    """Whether a path may lead out of the folder, or is the folder itself."""
+    parts = Path(path).parts
+    return not parts or Path(path).is_absolute() or ".." in parts or "\0" in path

@@ -1,0 +1,85 @@
+"""Starts a window: a socket on this computer alone, a token, a browser."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import secrets
+import socket
+import webbrowser
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import uvicorn
+
+from pkmcal.app.folder import Folder
+from pkmcal.app.server import guarded
+
+HOST = "127.0.0.1"
+DOOR = ".open-pkmcal.html"
+_DOOR = """<!doctype html><meta charset="utf-8"><title>pkmcal</title>
+<meta http-equiv="refresh" content="0; url={url}"><a href="{url}">pkmcal</a>
+"""
+_QUEUE = 64  # connections that wait to be taken
+
+
+def launch(
+    path: Path,
+    say: Callable[[str], object],
+    browser: bool = True,
+    port: int = 0,
+    testing: bool = False,
+) -> None:
+    """Serve the project of a folder until it is interrupted.
+
+    Parameters
+    ----------
+    path : Path
+        The folder, which is made if it is not there.
+    say : callable
+        Takes the line with the address, once the server listens.
+    browser : bool
+        Whether to open it in the browser.
+    port : int
+        Where to listen; 0 takes one that is free.
+
+    Raises
+    ------
+    ValueError
+        A project file with a mistake.
+    OSError
+        The port is taken.
+    """
+    folder = Folder(path)
+    token = secrets.token_urlsafe(24)
+    with contextlib.closing(socket.socket(socket.AF_INET, socket.SOCK_STREAM)) as listening:
+        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listening.bind((HOST, port))
+        listening.listen(_QUEUE)  # a fast browser is here before the server is
+        port = listening.getsockname()[1]
+        url = f"http://{HOST}:{port}/#t={token}"
+        door = _door(folder.path, url, browser)
+        config = uvicorn.Config(
+            guarded(folder, port, token, door, testing), log_level="error", access_log=False,
+            proxy_headers=False, server_header=False, timeout_graceful_shutdown=1, lifespan="on",
+        )  # fmt: skip
+        say(f"{folder.path}\n{url}")
+        uvicorn.Server(config).run(sockets=[listening])
+
+
+@contextlib.contextmanager
+def _door(folder: Path, url: str, browser: bool) -> Iterator[None]:
+    """Keep a file that only its owner reads and that leads to the page, and open it.
+
+    A browser's arguments are in everybody's list of processes, so the token is not among them.
+    """
+    path = folder / DOOR
+    path.unlink(missing_ok=True)
+    with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as file:
+        file.write(_DOOR.format(url=url))
+    try:
+        if browser:
+            webbrowser.open(path.as_uri())
+        yield
+    finally:
+        path.unlink(missing_ok=True)

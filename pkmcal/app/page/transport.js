@@ -1,0 +1,72 @@
+// The server's answers. Everything that leaves the page goes through here.
+const fragment = new URLSearchParams(location.hash.slice(1))
+if (fragment.get('t')) {
+  localStorage.setItem('token', fragment.get('t'))
+  history.replaceState(null, '', location.pathname)
+}
+const tab = crypto.randomUUID()
+const headers = { 'x-pkmcal-token': localStorage.getItem('token') ?? '', 'x-pkmcal-tab': tab }
+
+async function ask(path, settings = {}) {
+  const answer = await fetch(path, { ...settings, headers })
+  if (answer.status === 401) throw Error('This page has no right to this server: open it from the terminal again.')
+  if (!answer.ok && answer.status !== 409) throw Error((await answer.json().catch(() => ({}))).error ?? `${answer.status}`)
+  return answer
+}
+
+const post = (path, data) => ask(path, { method: 'POST', body: JSON.stringify(data ?? {}) })
+export const state = async () => (await ask('/api/state')).json()
+export const core = async kind => packed(await (await ask(`/wasm/${kind}`)).arrayBuffer())
+export const cancel = job => post(`/api/cancel/${job}`)
+
+// The new state, and whether another tab was first.
+export async function change(table, version) {
+  const answer = await post('/api/state', { state: table, version })
+  return { ...(await answer.json()), late: answer.status === 409 }
+}
+
+export async function undo(version) {
+  const answer = await post('/api/undo', { version })
+  return { ...(await answer.json()), late: answer.status === 409 }
+}
+
+export async function send(file) {
+  const answer = await ask(`/api/file/${encodeURIComponent(file.name || 'file')}`, { method: 'PUT', body: file })
+  return (await answer.json()).name
+}
+
+export const run = (operation, given) => post(`/api/run/${operation}`, given).then(lines)
+
+export async function* changes() {
+  for await (const message of lines(await ask('/api/events'))) if (message.changed && message.by !== tab) yield message
+}
+
+export async function save(path) {
+  const answer = await ask(`/api/download/${path.split('/').map(encodeURIComponent).join('/')}`)
+  const link = document.createElement('a')
+  link.href = URL.createObjectURL(await answer.blob())
+  link.download = path.split('/').pop()
+  link.click()
+  setTimeout(() => URL.revokeObjectURL(link.href), 60000)
+}
+
+async function* lines(answer) {
+  const reader = answer.body.pipeThrough(new TextDecoderStream()).getReader()
+  let rest = ''
+  for (;;) {
+    const { value, done } = await reader.read()
+    if (done) return
+    const parts = (rest + value).split('\n')
+    rest = parts.pop()
+    for (const part of parts) if (part) yield JSON.parse(part)
+  }
+}
+
+// As the scripts of a machine take their core: compressed and in base64.
+async function packed(bytes) {
+  const stream = new Blob([bytes]).stream().pipeThrough(new CompressionStream('deflate'))
+  const small = new Uint8Array(await new Response(stream).arrayBuffer())
+  let text = ''
+  for (let k = 0; k < small.length; k += 4096) text += String.fromCharCode(...small.subarray(k, k + 4096))
+  return btoa(text)
+}

@@ -1,0 +1,298 @@
+"""The server of a window: its page, the project, files, and streams of what is computed.
+
+It computes nothing and imports nothing that does: that is the worker's.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import os
+import secrets
+import tempfile
+from collections.abc import AsyncIterator
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from starlette.applications import Starlette
+from starlette.requests import ClientDisconnect, Request
+from starlette.responses import FileResponse, JSONResponse, Response, StreamingResponse
+from starlette.routing import Route
+
+from pkmcal.app.commands import commands
+from pkmcal.app.folder import MOST_FILE, MOST_FOLDER, Folder
+from pkmcal.app.guard import Application, Guard
+from pkmcal.app.process import Message, Worker
+from pkmcal.exceptions import Error
+from pkmcal.view import scripts
+
+OPERATIONS = ("machine", "plan", "look", "fit", "out", "report")
+FOR_TESTS = ("wait", "crash")
+PAGES = ("app.css", "app.js", "frame.js", "transport.js", "picture.js", "machine.js", "plan.js",
+         "measure.js", "result.js", "out.js")  # fmt: skip
+_KINDS = {".css": "text/css", ".js": "text/javascript", ".html": "text/html"}
+_MOST_STATE = 1_000_000  # bytes
+_SILENT = 15.0  # s, after which a stream of events says that it is there
+
+
+class Server:
+    """What answers the page of one project."""
+
+    def __init__(
+        self,
+        folder: Folder,
+        worker: Worker,
+        operations: tuple[str, ...],
+        door: contextlib.AbstractContextManager[None],
+    ) -> None:
+        self._folder, self._worker, self._operations, self._door = folder, worker, operations, door
+        self._listeners: set[asyncio.Queue[Message]] = set()
+        self._running: dict[str, asyncio.Event] = {}
+
+    def application(self) -> Starlette:
+        """Return the routes, without the guard."""
+
+        @contextlib.asynccontextmanager
+        async def life(_: Starlette) -> AsyncIterator[None]:
+            with self._door:  # uvicorn ends by the signal that it got: nothing after it runs
+                await self._worker.start()  # it imports while the page is opened
+                yield
+                await self._worker.stop()
+
+        return Starlette(
+            lifespan=life,
+            routes=[
+                _static("/", "index.html"),
+                *(_static(f"/{name}", name) for name in PAGES),
+                _constant("/view.js", scripts.module("calibration").encode(), "text/javascript"),
+                _constant("/view.css", scripts.style().encode(), "text/css"),
+                Route("/wasm/{kind}", self.core),
+                Route("/api/state", self.state),
+                Route("/api/state", self.change, methods=["POST"]),
+                Route("/api/undo", self.undo, methods=["POST"]),
+                Route("/api/file/{name:path}", self.upload, methods=["PUT"]),
+                Route("/api/run/{operation}", self.run, methods=["POST"]),
+                Route("/api/cancel/{job}", self.cancel, methods=["POST"]),
+                Route("/api/events", self.events),
+                Route("/api/download/{path:path}", self.download),
+                Route("/api/health", self.health),
+            ],
+        )
+
+    async def core(self, request: Request) -> Response:
+        """The WebAssembly of a kind of machine."""
+        name = scripts.MODULES.get(request.path_params["kind"])
+        if name is None:
+            return _refused(404, "no such core")
+        return Response(scripts.resource(f"wasm/{name}.wasm"), media_type="application/wasm")
+
+    async def state(self, request: Request) -> Response:
+        """The project, its files, and what each screen does as lines for a terminal."""
+        return JSONResponse(self._state())
+
+    def _state(self) -> Message:
+        folder = self._folder
+        return {
+            "version": folder.version,
+            "state": folder.project.table(),
+            "files": folder.files,
+            "folder": str(folder.path),
+            "undo": folder.undoable,
+            "commands": commands(folder.project),
+            "machines": _built_in(),
+        }
+
+    async def change(self, request: Request) -> Response:
+        """Take a whole new state of the version that it was made of."""
+        try:
+            asked = json.loads(await _body(request))
+            table, version = asked["state"], asked["version"]
+        except _TooLarge:
+            return _refused(413, "too large")
+        except (ValueError, RecursionError, TypeError, KeyError):
+            return _refused(400, "no state in this request")
+        try:
+            taken = isinstance(table, dict) and self._folder.change(table, version)
+        except Error as error:
+            return _refused(400, str(error))
+        return self._changed(request, taken)
+
+    async def undo(self, request: Request) -> Response:
+        """Go one state back."""
+        try:
+            version = json.loads(await _body(request))["version"]
+        except (ValueError, RecursionError, TypeError, KeyError, _TooLarge):
+            return _refused(400, "no version in this request")
+        return self._changed(request, self._folder.undo(version))
+
+    def _changed(self, request: Request, taken: bool) -> Response:
+        if not taken:
+            return JSONResponse({**self._state(), "error": "changed elsewhere"}, 409)
+        told = {"changed": self._folder.version, "by": request.headers.get("x-pkmcal-tab", "")}
+        for queue in self._listeners:
+            queue.put_nowait(told)
+        return JSONResponse(self._state())
+
+    async def upload(self, request: Request) -> Response:
+        """Take a file into the folder: the whole of it, or nothing."""
+        announced = request.headers.get("content-length", "0")
+        room = min(MOST_FILE, MOST_FOLDER - self._folder.used())
+        large = f"files of this project may have {MOST_FILE // 10**6} MB, all of them together 1 GB"
+        if not announced.isdecimal() or int(announced) > room:
+            return _refused(413, large)
+        place, part = tempfile.mkstemp(suffix=".part", prefix=".", dir=self._folder.path)
+        try:
+            count = 0
+            with os.fdopen(place, "wb") as out:
+                async for chunk in request.stream():
+                    count += len(chunk)
+                    if count > room:
+                        return _refused(413, large)
+                    out.write(chunk)
+            name = self._folder.store(request.path_params["name"], Path(part))
+        except ClientDisconnect:
+            return _refused(400, "not complete")
+        finally:
+            Path(part).unlink(missing_ok=True)
+        return JSONResponse({"name": name})
+
+    async def run(self, request: Request) -> Response:
+        """Stream what an operation of the worker says, line by line."""
+        operation = request.path_params["operation"]
+        if operation not in self._operations:
+            return _refused(404, "no such work")
+        try:
+            asked = json.loads(await _body(request) or b"{}")
+        except (ValueError, RecursionError, _TooLarge):
+            return _refused(400, "no request")
+        if not isinstance(asked, dict):
+            return _refused(400, "no request")
+        return _streamed(self._lines(operation, asked))
+
+    async def _lines(self, operation: str, asked: Message) -> AsyncIterator[bytes]:
+        job = secrets.token_urlsafe(6)
+        stopped = self._running[job] = asyncio.Event()
+        messages = self._worker.run(operation, state=self._folder.project.table(), given=asked)
+        stop = asyncio.ensure_future(stopped.wait())
+        following: asyncio.Future[Message | None] = asyncio.ensure_future(anext(messages, None))
+        try:
+            yield _line({"job": job})
+            while True:
+                tasks: set[asyncio.Future[Any]] = {following, stop}
+                await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+                if not following.done():
+                    await _ended(following)
+                    yield _line({"error": {"message": "stopped", "stopped": True}})
+                    return
+                message = following.result()
+                if message is None:
+                    return
+                yield _line(message)
+                following = asyncio.ensure_future(anext(messages, None))
+        finally:  # also where the tab was closed
+            stop.cancel()
+            self._running.pop(job, None)
+            await asyncio.shield(_ended(following))
+
+    async def cancel(self, request: Request) -> Response:
+        """Stop a job at once."""
+        event = self._running.get(request.path_params["job"])
+        if event is not None:
+            event.set()
+        return JSONResponse({"stopped": event is not None})
+
+    async def events(self, request: Request) -> Response:
+        """Stream that the project changed, and by which tab."""
+        return _streamed(self._events())
+
+    async def _events(self) -> AsyncIterator[bytes]:
+        queue: asyncio.Queue[Message] = asyncio.Queue()
+        self._listeners.add(queue)
+        try:
+            yield _line({"version": self._folder.version})
+            while True:
+                try:
+                    yield _line(await asyncio.wait_for(queue.get(), _SILENT))
+                except asyncio.TimeoutError:
+                    yield b"\n"
+        finally:
+            self._listeners.discard(queue)
+
+    async def download(self, request: Request) -> Response:
+        """A file of the folder, never shown by the browser itself."""
+        found = self._folder.written(request.path_params["path"])
+        if found is None:
+            return _refused(404, "no such file")
+        return FileResponse(found, media_type="application/octet-stream", filename=found.name)
+
+    async def health(self, request: Request) -> Response:
+        """The worker's process and how often one was started."""
+        return JSONResponse({"worker": self._worker.pid, "starts": self._worker.starts})
+
+
+@cache
+def _built_in() -> list[str]:
+    """Return the names of all built-in machines, as files that nobody has to read."""
+    folders = (files("pkmcal.builtin").joinpath(kind) for kind in ("machines", "arms"))
+    found = [each.name for folder in folders for each in folder.iterdir()]
+    return sorted(name.removesuffix(".toml") for name in found if name.endswith(".toml"))
+
+
+def guarded(
+    folder: Folder,
+    port: int,
+    token: str,
+    door: contextlib.AbstractContextManager[None],
+    testing: bool = False,
+) -> Application:
+    """Return the whole application: routes behind the guard; `door` is open while it is there."""
+    operations = OPERATIONS + FOR_TESTS * testing
+    server = Server(folder, Worker(folder.path), operations, door)
+    return Guard(server.application(), port, token)
+
+
+class _TooLarge(Exception):
+    """A request has more bytes than it may have."""
+
+
+async def _ended(task: asyncio.Future[Any]) -> None:
+    """End a task, and wait until it has ended."""
+    task.cancel()
+    with contextlib.suppress(asyncio.CancelledError):
+        await task
+
+
+async def _body(request: Request) -> bytes:
+    found = b""
+    async for chunk in request.stream():
+        found += chunk
+        if len(found) > _MOST_STATE:
+            raise _TooLarge
+    return found
+
+
+def _static(path: str, name: str) -> Route:
+    content = files("pkmcal.app").joinpath(f"page/{name}").read_bytes()
+    return _constant(path, content, _KINDS[Path(name).suffix])
+
+
+def _constant(path: str, content: bytes, kind: str) -> Route:
+    async def answer(request: Request) -> Response:
+        return Response(content, media_type=kind)
+
+    return Route(path, answer)
+
+
+def _streamed(lines: AsyncIterator[bytes]) -> StreamingResponse:
+    return StreamingResponse(lines, media_type="application/x-ndjson")
+
+
+def _refused(status: int, why: str) -> Response:
+    return JSONResponse({"error": why}, status)
+
+
+def _line(message: Any) -> bytes:
+    return json.dumps(message, separators=(",", ":"), allow_nan=False).encode() + b"\n"

@@ -1,0 +1,83 @@
+"""A server of a project for a test, and Debian's Chromium that looks at it."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser"))), None)
+
+
+@dataclass(frozen=True)
+class Served:
+    """A project that is served: its folder, address and process."""
+
+    folder: Path
+    url: str
+    process: subprocess.Popen[str]
+
+    @property
+    def token(self) -> str:
+        return self.url.partition("#t=")[2]
+
+    @property
+    def port(self) -> int:
+        return int(self.url.split(":")[2].partition("/")[0])
+
+
+@contextmanager
+def served(folder: Path) -> Iterator[Served]:
+    """Serve a folder, with operations for tests, until the end of the block."""
+    code = (
+        "import sys, pathlib; from pkmcal.app.launch import launch;"
+        "launch(pathlib.Path(sys.argv[1]), lambda text: print(text, flush=True), browser=False,"
+        " testing=True)"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", code, str(folder)],
+        stdout=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONUNBUFFERED": "1"},
+    ) as process:
+        try:
+            assert process.stdout is not None
+            process.stdout.readline()
+            yield Served(folder, process.stdout.readline().strip(), process)
+        finally:
+            process.terminate()
+            process.wait(timeout=20)
+
+
+@contextmanager
+def page_of(served: Served, **context: Any) -> Iterator[Any]:
+    """Open the page in Chromium; no other host is asked, and nothing is said on the console."""
+    api = pytest.importorskip("playwright.sync_api", reason="no Playwright: make test-app")
+    if CHROMIUM is None:
+        pytest.skip("no Chromium here: make test-app")
+    with api.sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        page = chromium.new_context(accept_downloads=True, **context).new_page()
+        page.set_default_timeout(60_000)
+        said: list[str] = []
+        elsewhere: list[str] = []
+        page.on(
+            "console", lambda m: said.append(m.text) if m.type in ("error", "warning") else None
+        )
+        page.on("pageerror", lambda error: said.append(str(error)))
+        own = (f"http://127.0.0.1:{served.port}/", "blob:", "data:")
+        page.on("request", lambda r: None if r.url.startswith(own) else elsewhere.append(r.url))
+        page.goto(served.url)
+        page.locator("body[data-ready]").wait_for(state="attached")
+        yield page
+        assert not said, said
+        assert not elsewhere, elsewhere
+        chromium.close()
