@@ -24,6 +24,7 @@ Unit = Literal[
     "N mm", "N/mm", "mm/N", "rad/(N mm)", "kg",
 ]  # fmt: skip
 
+_LONG = 8  # rows in a row that have a matrix in common, on the average, to be one product
 _ALIKE = 1e-6  # share by which entries of a direction differ that are not equal
 
 
@@ -150,6 +151,32 @@ def lots(count: int, most: int = 16384) -> Iterator[slice]:
     """
     for first in range(0, count, most):
         yield slice(first, first + most)
+
+
+def first_of_equal(rows: FloatArray) -> IntArray:
+    """Which rows (N, k) differ from the one before: the first of each lot of equal ones."""
+    changed = np.any(rows[1:] != rows[:-1], axis=1)
+    return np.flatnonzero(np.concatenate([np.ones(len(rows[:1]), dtype=bool), changed]))
+
+
+def chained(rows: FloatArray, matrices: FloatArray, place: IntArray) -> FloatArray:
+    """Derivatives (N, k, w) times the matrix (w, m) of each row, (N, k, m).
+
+    `matrices` are (P, w, m), `place` (N,) which of them a row has. Where many rows in a row have
+    one in common, as the corners of a picture, each is one product: copies would take most time.
+    """
+    starts = np.flatnonzero(np.diff(place, prepend=-1))
+    if len(starts) * _LONG >= len(rows):
+        each = np.array_equal(place, np.arange(len(matrices)))
+        return rows @ (matrices if each else matrices[place])
+    (_, k, w), m = rows.shape, matrices.shape[2]
+    found = np.empty((len(rows), k, m))
+    ends = [*starts[1:].tolist(), len(rows)]
+    for first, last in zip(starts.tolist(), ends, strict=True):
+        count = (last - first) * k
+        flat, into = rows[first:last].reshape(count, w), found[first:last].reshape(count, m)
+        np.matmul(flat, matrices[place[first]], out=into)
+    return found
 
 
 def rms(values: FloatArray) -> float:

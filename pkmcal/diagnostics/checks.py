@@ -5,6 +5,7 @@ from __future__ import annotations
 from pkmcal.diagnostics import (
     causes,
     course,
+    elsewhere,
     families,
     gain,
     held_out,
@@ -27,8 +28,8 @@ from pkmcal.diagnostics.diagnosis import verified
 
 CHECKS = verified((
     *held_out.CHECKS, *readings.CHECKS, *units.CHECKS, *refitted_readings.CHECKS, *families.CHECKS,
-    *machine.CHECKS, *loads.CHECKS, *search.CHECKS, *rows.CHECKS, *near_copies.CHECKS,
-    *rounded.CHECKS, *noise.CHECKS, *priors.CHECKS, *course.CHECKS, *causes.CHECKS,
-    *regions.CHECKS, *gain.CHECKS, *sag.CHECKS, *waves.CHECKS,
+    *machine.CHECKS, *loads.CHECKS, *search.CHECKS, *rows.CHECKS, *elsewhere.CHECKS,
+    *near_copies.CHECKS, *rounded.CHECKS, *noise.CHECKS, *priors.CHECKS, *course.CHECKS,
+    *causes.CHECKS, *regions.CHECKS, *gain.CHECKS, *sag.CHECKS, *waves.CHECKS,
 ))  # fmt: skip
 AT_ONCE = tuple(check for check in CHECKS if check.at_once)

@@ -17,6 +17,7 @@ from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.parameters import Parameters
+from pkmcal.exceptions import ArgumentError
 from pkmcal.fitted.solution import Solution
 from pkmcal.measurements.measurements import Measurements
 
@@ -81,7 +82,10 @@ def _read_as(
     data: FitData, parameters: Parameters, near: FloatArray | None, read: BoolArray
 ) -> FloatArray:
     """Misfit of each row as it is read now, mm; only of what was read."""
-    residual = np.where(read, _alone(data, parameters, near), 0.0)
+    try:
+        residual = np.where(read, _alone(data, parameters, near), 0.0)
+    except ArgumentError:  # such readings are refused
+        return np.full(len(data.measured), np.nan)
     return _misfits(residual, data.measured, parameters.robot.length)
 
 

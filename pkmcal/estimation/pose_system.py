@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.arrays import FloatArray, IntArray, chained
 from pkmcal.estimation.elimination import Shares, System
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.prediction import Prediction
@@ -54,7 +54,7 @@ class PoseSystem:
         predicted = self.prediction.at(states.pose, theta)
         residuals = self.prediction.residuals(predicted)
         by_pose = [
-            m.instrument.by_difference(each.by_twist @ twists[place], residual)
+            m.instrument.by_difference(chained(each.by_twist, twists, place), residual)
             for m, each, place, residual in zip(
                 table.sets, predicted, table.pose_of, residuals, strict=True
             )

@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, IntArray, lots
+from pkmcal.arrays import FloatArray, IntArray, chained, lots
 from pkmcal.effects.effect import EffectOfRows
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.fit_data import FitData
@@ -362,8 +362,8 @@ def _add_motion(
     `by_twist` is (N, k, 6), `place` (N,) which of the twists moves each row; `NONE`: none of them.
     """
     into = part[:, :, : twists.shape[2]]
-    if np.array_equal(place, np.arange(len(twists))):  # each its own: copies would take most time
-        into += by_twist @ twists
-        return
     moved = np.flatnonzero(place != NONE)
-    into[moved] += by_twist[moved] @ twists[place[moved]]
+    if len(moved) == len(place):
+        into += chained(by_twist, twists, place)
+    else:
+        into[moved] += chained(by_twist[moved], twists, place[moved])

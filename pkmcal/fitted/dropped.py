@@ -96,17 +96,17 @@ def outlying(estimator: Estimator, estimate: Estimate) -> BoolArray:
         estimate.weights,
         estimate.prior @ estimate.half[:, :fitted],
     )
-    odd = np.union1d(odd, _elsewhere(estimator, estimate))
+    odd = np.union1d(odd, elsewhere(equations, estimate))
     return np.isin(equations.blocks.block_of_row, odd)
 
 
-def _elsewhere(estimator: Estimator, estimate: Estimate) -> IntArray:
+def elsewhere(equations: Equations, estimate: Estimate) -> IntArray:
     """Poses at which much was read that agrees, but not with where the actuators say it is.
 
     Of a picture, nearly all that is left says how good its corners are; the few numbers that say
     where the machine was are compared by themselves.
     """
-    equations, fitted = estimator.equations, estimate.state.fitted.rank
+    fitted = estimate.state.fitted.rank
     if equations.system is None or not (equations.blocks.components >= LARGE).any():
         return np.empty(0, dtype=np.intp)
     left = np.column_stack([estimate.residual, estimate.design[:, :fitted]])

@@ -20,8 +20,18 @@ def row_names(datasets: Sequence[FitData], rows: Iterable[int]) -> str:
         mine = np.flatnonzero(np.isin(data.rows, named))
         where.update(zip(data.rows[mine].tolist(), ((data, i) for i in mine.tolist()), strict=True))
     places: dict[str, list[str]] = {}
+    whole = dict[tuple[int, int], int]()
+    for data, i in where.values():
+        if data.measured.group is not None:
+            key = id(data), int(data.measured.group[i])
+            whole[key] = whole.get(key, 0) + 1
     for row in named:
         data, i = where[row]
+        group = data.measured.group
+        if group is not None and (count := whole[id(data), int(group[i])]) > _MOST:
+            file = f" of {printable(data.measured.file)}" if data.measured.file else ""
+            places.setdefault(f"pose {group[i]}{file} ({count} rows)", [])
+            continue
         targets = places.setdefault(_place(data, i), [])
         targets += _target(data, i)
     listed = [

@@ -17,12 +17,16 @@ from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.core import instruments, screws
 from pkmcal.readings import orientation
 from pkmcal.readings.alignment import nearest_rotations
+from pkmcal.statistics.distributions import f_tail
 
+_FEWEST = 4  # corners of a picture that tell where a flat board is; of another one two more
 _UNBENDING = 20  # rounds of undoing the distortion
 _STEPS = 30  # of Levenberg and Marquardt
 _SMALL = 1e-10  # step, as a share of the distance and in rad, at which a place is found
 _SAME = 1e-4  # turning between two places, rad, below which they are one
 _LINE = 0.01  # square across over along, at which corners of a picture are in a line
+_BY_CHANCE = 1e-9  # that corners seem so much further off at the right place
+_SQUARE = 1e-10  # the same of corners of which a line is told apart to a few digits
 _FLAT = 1e-6  # share of a board's size by which its corners may stand off a plane
 
 
@@ -36,10 +40,14 @@ class BoardPoses:
         Of the board in axes of the camera, mm and rad; the second is NaN where there is but one.
     rms : ndarray (P, 2)
         How far off the corners are, px.
+    possible : ndarray of bool (P, 2)
+        Whether it can be there: not where the corners of the other place are off by so much less
+        that chance does not explain it.
     """
 
     pose: FloatArray
     rms: FloatArray
+    possible: BoolArray
 
 
 def board_poses(
@@ -69,7 +77,12 @@ def board_poses(
     pose[swap], rms[swap] = pose[swap, ::-1], rms[swap, ::-1]
     same = ~(np.linalg.norm(turn, axis=1) > _SAME)
     pose[same, 1], rms[same, 1] = np.nan, np.nan
-    return BoardPoses(pose, rms)
+    possible = np.isfinite(rms)
+    for each in np.flatnonzero(possible.all(axis=1) & (rms[:, 0] > 0)).tolist():
+        freedom = 2 * int((picture == each).sum()) - 6
+        ratio = float(rms[each, 1] / rms[each, 0]) ** 2
+        possible[each, 1] = f_tail(ratio, freedom, freedom) > _BY_CHANCE
+    return BoardPoses(pose, rms, possible)
 
 
 def unbent(pixel: FloatArray, lens: FloatArray) -> FloatArray:
@@ -88,31 +101,47 @@ def unbent(pixel: FloatArray, lens: FloatArray) -> FloatArray:
 
 def in_a_line(corner: FloatArray, picture: IntArray, pictures: int) -> BoolArray:
     """Pictures (P,) of which corners (N, 3) are in a line, or nearly: they tell no turning."""
-    squares = np.zeros((pictures, 3, 3))
     count = np.maximum(np.bincount(picture, minlength=pictures), 1)
-    middle = (
-        np.stack([np.bincount(picture, x, pictures) for x in corner.T], axis=1) / count[:, None]
-    )
-    away = corner - middle[picture]
-    np.add.at(squares, picture, away[:, :, None] * away[:, None, :])
+    away = corner - (_summed(corner, picture, pictures) / count[:, None])[picture]
+    squares = _summed(away[:, :, None] * away[:, None, :], picture, pictures)
     size = np.linalg.eigvalsh(squares)
     return np.asarray(size[:, 1] <= _LINE * size[:, 2])
 
 
-def mm_per_pixel(corner: FloatArray, pixel: FloatArray) -> float:
-    """What a pixel is at a board, mm, by its picture as if from far away.
+def pictures_told(
+    corner: FloatArray, pixel: FloatArray, picture: IntArray
+) -> tuple[IntArray, IntArray]:
+    """Rows (n,) of pictures that tell where a board is, and which picture each is of (n,).
 
-    NaN where corners (k, 3) are in a line.
+    Of N rows those whose pixel is not NaN count. `picture` (N,) counts from 0; that of what is
+    found does so, too.
     """
-    if len(corner) < 3:
-        return float("nan")
-    away = corner - corner.mean(axis=0)
-    size, axes = np.linalg.svd(away, full_matrices=False)[1:]
-    across = axes[size > 1e-6 * size[0]]
-    if len(across) < 2:
-        return float("nan")
-    image = np.linalg.lstsq(away @ across.T, pixel - pixel.mean(axis=0), rcond=None)[0]
-    return 1.0 / float(np.linalg.norm(image, ord=2))
+    known = np.isfinite(pixel).all(axis=1)
+    flat = np.linalg.svd(corner - corner.mean(axis=0), compute_uv=False)
+    fewest = _FEWEST if flat[-1] <= _FLAT * flat[0] else _FEWEST + 2
+    enough = np.bincount(picture[known], minlength=int(picture.max()) + 1) >= fewest
+    enough &= ~in_a_line(corner[known], picture[known], len(enough))
+    used = np.flatnonzero(known & enough[picture])
+    return used, np.unique(picture[used], return_inverse=True)[1].reshape(-1)
+
+
+def mm_per_pixel(corner: FloatArray, pixel: FloatArray, picture: IntArray) -> FloatArray:
+    """What a pixel is at the board of each picture, mm, by the picture as if from far away (P,).
+
+    NaN where corners (N, 3) of a picture are in a line. `picture` (N,) counts from 0.
+    """
+    count = np.bincount(picture)
+    both = np.hstack([corner, pixel])
+    away = both - (_summed(both, picture) / np.maximum(count, 1)[:, None])[picture]
+    products = _summed(away[:, :3, None] * away[:, None, :], picture)
+    size, axes = np.linalg.eigh(products[:, :, :3])
+    told = size > _SQUARE * size[:, -1:]
+    share = np.where(told, 1.0 / np.where(told, size, 1.0), 0.0)
+    image = (axes * share[:, None]) @ axes.transpose(0, 2, 1) @ products[:, :, 3:]
+    found = np.full(len(count), np.nan)
+    flat = told.sum(axis=1) > 1
+    found[flat] = 1.0 / np.linalg.norm(image[flat], ord=2, axis=(1, 2))
+    return found
 
 
 def _guessed(
@@ -256,8 +285,9 @@ def _moved(pose: FloatArray, twist: FloatArray) -> FloatArray:
     return screws.pose(moved.reshape(-1, 16))
 
 
-def _summed(rows: FloatArray, picture: IntArray) -> FloatArray:
-    """Sums (P, ...) of the rows of each picture."""
-    total = np.zeros((int(picture.max()) + 1, *rows.shape[1:]))
-    np.add.at(total, picture, rows)
-    return total
+def _summed(rows: FloatArray, picture: IntArray, pictures: int = 0) -> FloatArray:
+    """Sums (P, ...) of the rows of each picture; there are `pictures` at least."""
+    columns = rows.reshape(len(rows), -1).T
+    total = np.stack([np.bincount(picture, column, pictures) for column in columns], axis=1)
+    found: FloatArray = total.reshape(len(total), *rows.shape[1:]).astype(np.float64, copy=False)
+    return found

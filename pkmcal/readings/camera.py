@@ -12,7 +12,7 @@ scatter is then no noise of the corners, and is estimated beside it (`tells_actu
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from typing import Any, ClassVar, Literal, get_args
 
@@ -20,18 +20,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal.arguments import word
-from pkmcal.arrays import FloatArray, IntArray, as_rows
+from pkmcal.arrays import FloatArray, IntArray, as_rows, chained, first_of_equal
 from pkmcal.core import instruments, screws
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.csv_table import Table
 from pkmcal.readings import rows, twists
-from pkmcal.readings.board_poses import board_poses, in_a_line, mm_per_pixel, unbent
+from pkmcal.readings.board_poses import board_poses, mm_per_pixel, pictures_told, unbent
 from pkmcal.readings.boards import Board
-from pkmcal.readings.lens_doubts import lens_doubts
+from pkmcal.readings.lens_doubts import facing, lens_doubts
 from pkmcal.readings.lens_files import read_lens
 from pkmcal.readings.measured import InFit, Measured
 from pkmcal.readings.reading import At, Predicted, Reading, Sets, Solve
-from pkmcal.readings.seen_places import in_agreement
+from pkmcal.readings.seen_places import disagreement, in_agreement
 from pkmcal.readings.sight import visible
 from pkmcal.readings.unknowns import PLACE, Dependence, Numbers, Start, always
 from pkmcal.readings.unknowns import Found as Starts
@@ -47,7 +47,8 @@ _FOUND: Mapping[Found, tuple[int, ...]] = {
 }
 _NOWHERE = np.zeros(6)
 _NO_SIZE = np.zeros(1)
-_FEWEST = 4  # corners of a picture that tell where a flat board is; of another one 6
+_FEWEST = 4  # pictures, more of which tell that they are mirrored
+_OFF, _FALLS = 0.1, 3.0  # rad by which mirrored pictures are off, and how many times less mirrored
 _LEAST = 1e-9  # of what a number of the lens moves pixels by, where it moves none
 
 
@@ -181,33 +182,39 @@ class Camera(Reading):
     ) -> Predicted:
         """Pixels of corners with a board, or camera, at `tool` (N, 6) from `tool_origin` (N, 6)."""
         frame = _NOWHERE if at.frame is None else at.frame
+        each = np.hstack(np.broadcast_arrays(at.pose, tool_origin, tool))
+        first = first_of_equal(each)
+        pose, origin, within = (np.ascontiguousarray(part) for part in np.split(each[first], 3, 1))
         outer, near = screws.frames(np.stack([at.origin, frame]))
-        base, moved = outer @ near, screws.frames(at.pose)
-        mounted, within = (
-            screws.frames(np.ascontiguousarray(each.reshape(-1, 6))) for each in (tool_origin, tool)
-        )
-        to_mounting = base @ moved @ mounted
-        board, to_board = to_mounting @ within, None
+        base = outer @ near
+        to_mounting = base @ screws.frames(pose) @ screws.frames(origin)
+        board, to_board = to_mounting @ screws.frames(within), None
         if self.on == "platform":
             board = np.linalg.inv(board)
             to_board = -twists.adjoint(board)
+        picture = np.repeat(np.arange(len(first)), np.diff(first, append=len(each)))
         seen, by_twist, by_lens, by_size, depth = instruments.pixels(
-            screws.pose(np.ascontiguousarray(board).reshape(-1, 16)),
-            self._corners(len(at.pose)) if corner is None else corner,
+            screws.pose(np.ascontiguousarray(board).reshape(-1, 16))[picture],
+            self._corners(len(each)) if corner is None else corner,
             self.lens_numbers() if lens is None else lens,
             size,
         )
         seen[~(depth > 0)] = np.nan
-        by = by_twist if to_board is None else by_twist @ to_board
-        by_frame = None
+        of_pose = twists.adjoint(base[None]) @ twists.at_base(pose)
+        of_tool = twists.adjoint(to_mounting) @ twists.twists_of_numbers(within)
+        by = [of_pose, of_tool]
         if at.frame is not None:
-            by_frame = by @ twists.adjoint(outer[None]) @ twists.twists_of_numbers(at.frame[None])
-        of_tool = twists.adjoint(to_mounting) @ twists.twists_of_numbers(tool.reshape(-1, 6))
+            of_frame = twists.adjoint(outer[None]) @ twists.twists_of_numbers(at.frame[None])
+            by.append(np.broadcast_to(of_frame, of_pose.shape))
+        by_all = np.concatenate(by, axis=2)
+        if to_board is not None:
+            by_all = to_board @ by_all
+        by_poses = chained(by_twist, by_all, picture)
         return Predicted(
             seen,
-            by @ (twists.adjoint(base[None]) @ twists.at_base(at.pose)),
-            {"tool": by @ of_tool, "lens": by_lens, "size": by_size[:, :, None]},
-            by_frame=by_frame,
+            by_poses[:, :, :6],
+            {"tool": by_poses[:, :, 6:12], "lens": by_lens, "size": by_size[:, :, None]},
+            by_frame=None if at.frame is None else by_poses[:, :, 12:],
         )
 
     def dependences(self, data: InFit) -> Iterator[Dependence]:
@@ -245,14 +252,36 @@ class Camera(Reading):
         if not len(used):
             return found
         first = np.unique(number, return_index=True)[1]
-        boards = board_poses(
-            self._corners(len(m))[used], m.values[used], self.lens_numbers(), number
-        )
-        seen = boards.pose
+        at = pose[used[first]]
+        places, behind = self._in_agreement(m.values[used], m, used, number, at)
+        found[used[first]] = places
+        if behind and len(first) > _FEWEST:
+            mirrored = replace(self, p2=-self.p2)
+            across = m.values[used] * [-1, 1] + [2 * self.cx, 0]
+            other, _ = mirrored._in_agreement(across, m, used, number, at)
+            off, otherwise = disagreement(places, at), disagreement(other, at)
+            if off > _OFF and otherwise * _FALLS < off:
+                raise ArgumentError(
+                    f"measurements: the pictures are mirrored: where they show the board differs by"
+                    f" {np.degrees(off):.2g} deg from how the machine moves, and by"
+                    f" {np.degrees(otherwise):.2g} deg with left and right exchanged; take"
+                    " pictures without mirroring, or state u as the width less 1 less u"
+                )
+        return found
+
+    def _in_agreement(
+        self, pixel: FloatArray, m: Measured, used: IntArray, number: IntArray, pose: FloatArray
+    ) -> tuple[FloatArray, bool]:
+        """The tool in the frame (P, 6) by pixels of rows `used`; whether most show it from behind.
+
+        `number` are their pictures, `pose` (P, 6) the machine's.
+        """
+        boards = board_poses(self._corners(len(m))[used], pixel, self.lens_numbers(), number)
+        seen = np.where(boards.possible[:, :, None], boards.pose, np.nan)
+        behind = bool(np.median(facing(boards)) < 0.0)
         if self.on == "platform":
             seen = twists.inverse(seen.reshape(-1, 6)).reshape(seen.shape)
-        found[used[first]] = in_agreement(seen, pose[used[first]])
-        return found
+        return in_agreement(seen, pose), behind
 
     def doubts(self, m: Measured) -> Iterator[str]:
         """Lenses of turned or rectified pictures, mirrored pictures."""
@@ -264,14 +293,7 @@ class Camera(Reading):
 
     def _pictures_told(self, m: Measured) -> tuple[IntArray, IntArray]:
         """Rows (n,) of pictures that tell where a board is, and which picture each is of (n,)."""
-        picture, corner = self._pictures(m), self._corners(len(m))
-        known = np.isfinite(m.values).all(axis=1)
-        flat = np.linalg.svd(corner - corner.mean(axis=0), compute_uv=False)
-        fewest = _FEWEST if flat[-1] <= 1e-6 * flat[0] else 6
-        enough = np.bincount(picture[known], minlength=int(picture.max()) + 1) >= fewest
-        enough &= ~in_a_line(corner[known], picture[known], len(enough))
-        used = np.flatnonzero(known & enough[picture])
-        return used, np.unique(picture[used], return_inverse=True)[1].reshape(-1)
+        return pictures_told(self._corners(len(m)), m.values, self._pictures(m))
 
     def arguments(self, m: Measured) -> dict[str, FloatArray]:
         """What is mounted where, as a simulation was told."""
@@ -303,12 +325,10 @@ class Camera(Reading):
         """
         corner, picture = self._corners(len(m)), self._pictures(m)
         known = np.flatnonzero(np.isfinite(m.values).all(axis=1))
-        order = known[np.argsort(picture[known], kind="stable")]
-        ends = np.flatnonzero(np.diff(picture[order])) + 1
-        sizes = [mm_per_pixel(corner[own], m.values[own]) for own in np.split(order, ends)]
-        told = [each for each in sizes if np.isfinite(each)]
+        sizes = mm_per_pixel(corner[known], m.values[known], picture[known])
+        told = sizes[np.isfinite(sizes)]
         focal = max(self.fx, self.fy)
-        return np.full(2, float(np.median(told)) if told else length / focal)
+        return np.full(2, float(np.median(told)) if len(told) else length / focal)
 
     # rows -----------------------------------------------------------------------------------------
 

@@ -55,8 +55,11 @@ def of_frame_and_tool(measured: FloatArray, pose: FloatArray) -> tuple[FloatArra
     back = (unturned if kept else right[0]).reshape(3, 3).T  # Tᵀ but for its size and sign
     back = nearest_rotations(back if np.linalg.det(back) > 0 else -back)
     for _ in range(_ROUNDS):
+        before = back
         turn = nearest_rotations(_mean(m @ back @ p.transpose(0, 2, 1)))
         back = nearest_rotations(_mean(m.transpose(0, 2, 1) @ turn @ p))
+        if np.array_equal(back, before):
+            break
     by_places = _turn_of_places(at, origin)
     starts = [
         (turn, back),

@@ -61,7 +61,7 @@ def lens_doubts(
                 f" exchanged corners are {turned:.3g} px off in place of {off:.3g}; exchange fx and"
                 " fy, cx and cy, p1 and p2, or turn the pictures as the lens was calibrated"
             )
-    behind = int((_facing(found) < 0.0).sum())
+    behind = int((facing(found) < 0.0).sum())
     if behind > len(found.pose) / 2:
         yield (
             f"the board is seen from behind in {behind} of {len(found.pose)} pictures: pictures are"
@@ -76,7 +76,7 @@ def _typical(found: BoardPoses) -> float:
     return float(np.median(rms[np.isfinite(rms)])) if np.isfinite(rms).any() else float("inf")
 
 
-def _facing(found: BoardPoses) -> FloatArray:
+def facing(found: BoardPoses) -> FloatArray:
     """Above 0 where a board is seen from the front (P,), its z pointing away from the camera."""
     motion = screws.frames(np.ascontiguousarray(found.pose[:, 0]))
     facing: FloatArray = (motion[:, :3, 2] * motion[:, :3, 3]).sum(axis=1)

@@ -31,7 +31,7 @@ def in_agreement(seen: FloatArray, pose: FloatArray) -> FloatArray:
     chosen = np.zeros(len(seen), dtype=np.intp)
     if not doubtful.any() or len(seen) < 3:
         return _taken(seen, chosen)
-    random = np.random.default_rng(0)
+    random, known = np.random.default_rng(0), set[bytes]()
     best, least = chosen, np.inf
     for draw in range(_DRAWS):
         if draw:
@@ -40,6 +40,9 @@ def in_agreement(seen: FloatArray, pose: FloatArray) -> FloatArray:
             off = _misfits(seen, pose, some, sides)
             chosen = np.nanargmin(off, axis=1)
         for _ in range(_ROUNDS):
+            if chosen.tobytes() in known:  # an earlier draw went on from there
+                break
+            known.add(chosen.tobytes())
             off = _misfits(seen, pose, np.arange(len(seen)), chosen)
             before, chosen = chosen, np.nanargmin(off, axis=1)
             if np.array_equal(before, chosen):
@@ -50,18 +53,27 @@ def in_agreement(seen: FloatArray, pose: FloatArray) -> FloatArray:
     return _taken(seen, best)
 
 
+def disagreement(seen: FloatArray, pose: FloatArray) -> float:
+    """How far the median picture is from one frame and one tool, by places (P, 6) of each.
+
+    An angle, and a share of the distance added to it.
+    """
+    every = np.arange(len(seen))
+    return float(np.median(_misfits(seen[:, None], pose, every, np.zeros_like(every))))
+
+
 def _taken(seen: FloatArray, chosen: IntArray) -> FloatArray:
     taken: FloatArray = seen[np.arange(len(seen)), chosen]
     return taken
 
 
 def _misfits(seen: FloatArray, pose: FloatArray, some: IntArray, sides: IntArray) -> FloatArray:
-    """How far both places of each picture (P, 2) are from the frame and tool of some of them."""
+    """How far the places of each picture (P, k) are from the frame and tool of some of them."""
     frame, tool = of_frame_and_tool(seen[some, sides], pose[some])
     laid = compose(compose(frame, pose), tool)
     distance = float(np.median(np.linalg.norm(seen[:, 0, :3], axis=1)))
     off = np.full(seen.shape[:2], np.nan)
-    for side in range(2):
+    for side in range(seen.shape[1]):
         known = np.isfinite(seen[:, side]).all(axis=1)
         turned = orientation.between(seen[known, side, 3:], laid[known, 3:])
         moved = seen[known, side, :3] - laid[known, :3]

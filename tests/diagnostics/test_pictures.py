@@ -71,7 +71,7 @@ def with_lens(measured: pk.Measurements, **numbers: float) -> pk.Measurements:
 def test_sound_pictures_are_not_doubted(sound: pk.Measurements) -> None:
     found, said = checks(sound)
     assert "doubtful-readings" not in said and "hardly-turned" not in said
-    assert found.outliers == ()
+    assert found.outliers == () and "poses-elsewhere" not in said
     assert found.component_noise[0] == pytest.approx((NOISE, NOISE), rel=0.1)
     assert found.actuator_noise == pytest.approx(SCATTER, rel=0.3)
 
@@ -103,6 +103,8 @@ def test_mirrored_pictures_and_numbers_from_the_other_side_are_said(sound: pk.Me
     values[:, 0] = width - 1 - values[:, 0]
     mirrored = with_lens(replace(sound, values=values), cx=width - 1 - LENS["cx"])
     assert "mirrored" in doubts(mirrored)
+    with pytest.raises(pk.exceptions.ArgumentError, match="mirrored"):
+        pk.identify(pk.load("hexapod"), mirrored, FREE, fix="datum")
     behind = with_lens(sound, corner=np.asarray(sound.instrument.corner) * [-1, 1, 1])
     assert "seen from behind" in doubts(behind)
     fits = [
@@ -141,10 +143,26 @@ def test_a_picture_of_another_row_is_named_and_no_sound_one(
     mm: float, which: tuple[int, ...]
 ) -> None:
     measured = pictures(off=dict.fromkeys(which, mm))
-    found, _ = checks(measured)
+    found, said = checks(measured)
     named = {int(each) for each in measured.group[list(found.outliers)]}
     assert named == {*which}
     assert len(found.outliers) == len(which) * len(BOARD.ids)  # whole pictures
+    assert found.verdict.state == "doubtful"
+    assert all(f"pose {each} ({len(BOARD.ids)} rows)" in said["poses-elsewhere"] for each in which)
+
+
+def test_a_picture_that_carries_the_fit_is_grave_and_left_out_as_advised() -> None:
+    """Of 3 mm among legs of 0.01: no other number of the fit can be believed with it."""
+    measured = pictures(off={4: 3.0})
+    found, said = checks(measured)
+    assert found.verdict.state == "not calibrated" and "poses-elsewhere" in said
+    assert found.verdict.reasons[0] == said["poses-elsewhere"]
+    (own,) = (each for each in found.verdict.said if each.check == "poses-elsewhere")
+    assert {*measured.group[list(own.remedies[0].value)]} == {4}
+    without, said = checks(measured, drop="outliers")
+    assert {*measured.group[list(without.dropped)]} == {4}
+    assert without.verdict.state == "calibrated" and "poses-elsewhere" not in said
+    assert without.actuator_noise == pytest.approx(SCATTER, rel=0.3)
 
 
 @pytest.mark.parametrize(
