@@ -24,7 +24,10 @@ def _too_few(found: Solution) -> tuple[str, ...]:
     read = equations.table.actuators
     if (read == read[0]).all() and len(equations.table.rows) > 1:
         return ("all rows have the same actuators: measure different poses",)
-    if count < n and not len(found.fit.estimate.prior):
+    # effects and stated uncertainties bring a prior for each of their own numbers
+    own = sum(map(np.isfinite, found.fit.parameters.asked.of_effects.values()))
+    own += len(found.nuisances)
+    if count < n - own and len(found.fit.estimate.prior) <= own:
         return (
             f"{count} equations for {n} parameters: measure more poses, free fewer parameters or"
             " state a prior",
@@ -63,8 +66,10 @@ def _level_of_weak(found: Solution, weak: Weak) -> Level:
 
 
 def _undetermined(found: Solution) -> tuple[str, ...]:
-    """Coefficients of effects, by name, of which the measurements say nothing."""
+    """Numbers of effects, by name, of which the measurements say nothing."""
     of_effects = {*coefficients(found.fit.equations.prediction.datasets)}
+    if not found.gauges:  # else compliances are known but for the scale of forces, which is said
+        of_effects |= {*found.fit.parameters.asked.of_effects}
     return tuple(
         name
         for name, sigma in zip(found.free, found.stderr.tolist(), strict=True)
@@ -105,7 +110,7 @@ CHECKS = (
         remedies=lambda found, _: (Remedy("prior"),),
     ),
     Check(
-        name="undetermined-effect", about="coefficients of effects that are not determined",
+        name="undetermined-effect", about="numbers of effects that are not determined",
         unless=("grave",), run=lambda found: at_most_one(_undetermined(found) or None),
         say=lambda found, names: (
             f"{listed(names)} {'are' if len(names) > 1 else 'is'} not determined by these"

@@ -25,6 +25,7 @@ from pkmcal.statistics.linear_fit import numbered, sums
 WAVES = range(20, 321)  # a turn: gears of joints are no coarser, and few drives are finer
 LEAST_POSES = 100
 _SURE = 0.01  # chance of naming a wave where there is none
+_NEAREST = 5  # numbers of waves that are named where many look alike
 _STEP = 1e-3  # of a step, by which places on a grid may be off
 
 
@@ -157,6 +158,14 @@ def _run(found: Solution) -> tuple[Wave, ...]:
     return scan_waves(found) if any(name.startswith(("sag", "compliance")) for name in own) else ()
 
 
+def _alike(waves: int, period: int) -> list[str]:
+    """Numbers of waves that a grid of so many steps a turn cannot tell from these, the nearest."""
+    most = 2 * waves // period + 2
+    turns = range(-most, most + 1)
+    others = {abs(sign * waves + turn * period) for turn in turns for sign in (-1, 1)} - {waves, 0}
+    return [str(each) for each in sorted(sorted(others, key=lambda k: abs(k - waves))[:_NEAREST])]
+
+
 def _say(found: Solution, wave: Wave) -> str:
     effect = Harmonics(wave.waves, joints=wave.joint)
     alike = ""
@@ -164,7 +173,7 @@ def _say(found: Solution, wave: Wave) -> str:
         period = round(2 * np.pi / wave.steps)
         alike = (
             f"; the joint stood at steps of {np.degrees(wave.steps):.3g} deg, where"
-            f" {abs(wave.waves - period)} and {wave.waves + period} waves look alike"
+            f" {', '.join(_alike(wave.waves, period))} … waves look alike"
         )
     return (
         f"residuals follow {wave.waves} waves a turn of joint {wave.joint}, of"

@@ -150,6 +150,16 @@ def weighty(folder: Path) -> pk.Robot:
     return pk.load(path)
 
 
+def test_compliances_without_any_load_are_no_calibration() -> None:
+    robot, _ = yielding("hexapod", "offset*", 1.5e-4)
+    q = robot.inverse(pk.sample_poses(robot, 40, seed=3))
+    rows = pk.VirtualMachine(robot, NOISE, seed=1).measure(q, "pose")
+    found = pk.identify(robot, rows, free="offset*", effects=[pk.Elasticity("offset*")])
+    assert found.verdict.state == "doubtful"
+    (said,) = [each for each in found.verdict.said if each.check == "undetermined-effect"]
+    assert "compliance.offset1" in said.text
+
+
 def test_loads_that_nothing_follows_are_named_as_the_cause() -> None:
     robot, true = yielding("hexapod", "offset*", 1.5e-4)
     q = twice(robot, 25)

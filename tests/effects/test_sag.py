@@ -18,7 +18,7 @@ from pkmcal.arms.joint_pulls import JointPulls
 from pkmcal.arms.weights import at_rest, gravity_torques
 from pkmcal.arrays import FloatArray
 from pkmcal.calibration.rigid import rigid_arm
-from pkmcal.diagnostics.waves import scan_waves
+from pkmcal.diagnostics.waves import _alike, scan_waves
 from pkmcal.fitted.left_out import compared_by_poses
 from pkmcal.kinematics.calibratable import ArmMachine, as_machine
 
@@ -189,6 +189,25 @@ def test_a_rigid_arm_is_not_said_to_sag(shared: float) -> None:
         found = pk.identify(ARM, m, effects="auto", **UNKNOWN)
         assert not any(name.startswith("sag") for name in found.free)
         assert not any(said.check == "sag-lacking" for said in found.verdict.said)
+
+
+@pytest.mark.parametrize("effect", [pk.Sag(), pk.Sag("all"), pk.Harmonics(1)], ids=repr)
+def test_fewer_equations_than_numbers_are_said_whatever_effects_bring(effect: object) -> None:
+    """Priors of an effect's own numbers are no prior of the arm's."""
+    m = measured(commands(5, 40), built(6), 41)
+    found = pk.identify(ARM, m, effects=[effect], **UNKNOWN)
+    assert found.verdict.state != "calibrated"
+    assert any(said.check == "too-few-rows" for said in found.verdict.said)
+
+
+def test_numbers_of_waves_that_a_grid_confuses_are_mirrored_ones_too() -> None:
+    """On a grid of 36 steps a turn cosines of k and of |k ± 36 m| have the same values."""
+    theta = np.arange(36) * 2 * np.pi / 36
+    named = [int(each) for each in _alike(160, 36)]
+    assert named == [124, 128, 164, 196, 200]
+    for waves in named:
+        ours, theirs = np.cos(160 * theta), np.cos(waves * theta)
+        np.testing.assert_allclose(ours, theirs, atol=1e-9)
 
 
 def test_nothing_is_taken_unasked() -> None:
