@@ -206,6 +206,12 @@ def _beside_geometry(datasets: Sequence[FitData]) -> dict[tuple[str, str], Numbe
         role = dependence.role
         for name, own in dependence.estimated.items():
             known = found.setdefault((role, name), own)
+            if (known.names, known.units) != (own.names, own.units):
+                raise ArgumentError(
+                    f"effects or kind: two of them have numbers of one role, {role!r}, that are not"
+                    f" alike: {', '.join(known.names)} [{', '.join(known.units)}] and"
+                    f" {', '.join(own.names)} [{', '.join(own.units)}]; give each a role of its own"
+                )
             if not np.array_equal(known.start, own.start):
                 raise ArgumentError(
                     f"{role}: {role} {name} starts at different places in different"

@@ -238,6 +238,22 @@ def test_two_numbers_of_one_name_are_refused(
         pk.identify(robot, measured(true, q, 0), free="offset*", effects=[Named()])
 
 
+def test_numbers_of_one_role_that_are_not_alike_are_refused(
+    machine: tuple[pk.Robot, pk.Robot, FloatArray],
+) -> None:
+    """They were one number: two effects moved the platform by one coefficient."""
+
+    class Turning(Sinking):
+        def dependences(self, measured: pk.Measurements) -> Iterator[Dependence]:
+            (each,) = super().dependences(measured)
+            yield replace(each, estimated={"": replace(each.estimated[""], units=("rad",))})
+
+    robot, true, q = machine
+    effects = [Sinking(), Turning(name="turning", argument="turn")]
+    with pytest.raises(pk.ArgumentError, match=r"one role, 'sink', that are not alike: .*\[mm\]"):
+        pk.identify(robot, measured(true, q, 0), free="offset*", effects=effects)
+
+
 def test_what_is_no_effect_is_named(machine: tuple[pk.Robot, pk.Robot, FloatArray]) -> None:
     class Half:
         name = "half"
