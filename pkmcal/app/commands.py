@@ -13,6 +13,8 @@ REPORT, PLAN = "report", "plan"  # folders of the calibrated machine, and of pla
 _NAMES = {"c": "machine.h", "linuxcnc": "linuxcnc", "mjcf": "machine.xml", "fmu": "machine.fmu",
           "urdf": "machine.urdf", "sdf": "machine.sdf"}  # fmt: skip
 
+OUTPUTS = frozenset(_NAMES.values())
+
 
 def commands(project: Project) -> dict[str, list[str]]:
     """Return the lines of each screen, empty where it has nothing to do yet."""
@@ -36,5 +38,5 @@ def commands(project: Project) -> dict[str, list[str]]:
 
 def export(target: str) -> Exporting:
     """Return what writes the calibrated machine for a controller."""
-    name = _NAMES.get(target, f"{target}.txt")
+    name = _NAMES.get(target, f"for_{target}.txt")
     return Exporting(str(PurePath(REPORT) / "robot.toml"), target, name)

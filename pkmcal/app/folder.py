@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from pkmcal.app.commands import OUTPUTS, PLAN, REPORT
 from pkmcal.app.names import safe_name
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.atomic import write_whole
@@ -23,7 +24,9 @@ else:
     import tomli as tomllib  # type: ignore[import-not-found,unused-ignore]
 
 FILE = "project.toml"
-OWN = (FILE, "robot.toml", "commands.csv")  # names that are pkmcal's; a user's file gets another
+OWN = frozenset({  # names that are pkmcal's; a user's file gets another
+    FILE, "robot.toml", "certificate.toml", PLAN, REPORT, "machine", *OUTPUTS,
+})  # fmt: skip
 MOST_FILE, MOST_FOLDER = 100_000_000, 1_000_000_000  # bytes
 _UNDO = 100
 
@@ -47,6 +50,7 @@ class Folder:
         self.path = path.resolve()
         file = self.path / FILE
         self.project = _read(file) if file.is_file() else Project()
+        _refuse_elsewhere(self.project)
         self.version = 1
         self._before: list[Project] = []
 
@@ -76,7 +80,8 @@ class Folder:
         """Go back to the state before; False where there is none or another was first."""
         if version != self.version or not self._before:
             return False
-        self._take(self._before.pop())
+        self._take(self._before[-1])
+        del self._before[-1]
         return True
 
     @property
@@ -87,7 +92,7 @@ class Folder:
     def store(self, name: str, content: Path) -> str:
         """Take a file that was sent, and return the name that it has here."""
         name = safe_name(name)
-        if name in OWN or name.endswith(".part"):
+        if _is_own(name):
             name = f"my_{name}"
         content.replace(self.path / name)
         return name
@@ -113,13 +118,11 @@ class Folder:
 
     def _inside(self, project: Project) -> None:
         """Refuse files that are not in the folder, and places to write that are not."""
-        importing = project.importing
-        made = importing.out if importing else None
-        if made is not None and _outside(made):
-            raise ArgumentError("out: a folder within this project is expected")
-        for name in _named(project):
+        _refuse_elsewhere(project)
+        made = project.importing.out if project.importing else None
+        for name in named(project):
             below = made is not None and Path(name).parts[:1] == Path(made).parts  # not yet there
-            if _outside(name) or not (below or self.written(name) is not None):
+            if not (below or self.written(name) is not None):
                 raise ArgumentError(f"there is no file {json.dumps(name)} in this project")
 
     @staticmethod
@@ -136,7 +139,21 @@ def _read(file: Path) -> Project:
         return Project.of_text(text, str(file))
 
 
-def _named(project: Project) -> list[str]:
+def _refuse_elsewhere(project: Project) -> None:
+    """Refuse paths that lead out of the folder."""
+    if project.importing is not None and _outside(project.importing.out):
+        raise ArgumentError("import: out must be a folder within this project")
+    for name in named(project):
+        if _outside(name):
+            raise ArgumentError(f"{json.dumps(name)} is not within this project")
+
+
+def _is_own(name: str) -> bool:
+    """Whether pkmcal writes, or may write, a file or folder of this name."""
+    return name in OWN or name.startswith("new.") or name.endswith(".part")
+
+
+def named(project: Project) -> list[str]:
     """Return the files that a project names, the machine's first."""
     job, plan, importing = project.calibration, project.plan, project.importing
     reading = job.reading

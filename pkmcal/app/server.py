@@ -27,6 +27,7 @@ from pkmcal.app.folder import MOST_FILE, MOST_FOLDER, Folder
 from pkmcal.app.guard import Application, Guard
 from pkmcal.app.process import Message, Worker
 from pkmcal.exceptions import Error
+from pkmcal.jobs.stated import quoted
 from pkmcal.view import scripts
 
 OPERATIONS = ("machine", "plan", "look", "fit", "out", "report")
@@ -102,6 +103,7 @@ class Server:
             "folder": str(folder.path),
             "undo": folder.undoable,
             "commands": commands(folder.project),
+            "enter": quoted(["cd", str(folder.path)]),
             "machines": _built_in(),
         }
 
@@ -118,6 +120,8 @@ class Server:
             taken = isinstance(table, dict) and self._folder.change(table, version)
         except Error as error:
             return _refused(400, str(error))
+        except OSError as error:  # a full disk, a folder that may only be read
+            return _refused(507, str(error))
         return self._changed(request, taken)
 
     async def undo(self, request: Request) -> Response:
@@ -126,7 +130,10 @@ class Server:
             version = json.loads(await _body(request))["version"]
         except (ValueError, RecursionError, TypeError, KeyError, _TooLarge):
             return _refused(400, "no version in this request")
-        return self._changed(request, self._folder.undo(version))
+        try:
+            return self._changed(request, self._folder.undo(version))
+        except OSError as error:
+            return _refused(507, str(error))
 
     def _changed(self, request: Request, taken: bool) -> Response:
         if not taken:
@@ -143,7 +150,10 @@ class Server:
         large = f"files of this project may have {MOST_FILE // 10**6} MB, all of them together 1 GB"
         if not announced.isdecimal() or int(announced) > room:
             return _refused(413, large)
-        place, part = tempfile.mkstemp(suffix=".part", prefix=".", dir=self._folder.path)
+        try:
+            place, part = tempfile.mkstemp(suffix=".part", prefix=".", dir=self._folder.path)
+        except OSError as error:
+            return _refused(507, f"the file could not be kept: {error.strerror}")
         try:
             count = 0
             with os.fdopen(place, "wb") as out:
@@ -155,6 +165,8 @@ class Server:
             name = self._folder.store(request.path_params["name"], Path(part))
         except ClientDisconnect:
             return _refused(400, "not complete")
+        except OSError as error:
+            return _refused(507, f"the file could not be kept: {error.strerror}")
         finally:
             Path(part).unlink(missing_ok=True)
         return JSONResponse({"name": name})

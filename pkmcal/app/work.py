@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import difflib
 import os
-import shlex
+import re
 import signal
 import time
 from collections.abc import Callable
@@ -19,8 +19,10 @@ from typing import Any
 import pkmcal as pk
 from pkmcal.app import telling
 from pkmcal.app.commands import PLAN, REPORT, export
+from pkmcal.app.folder import named
+from pkmcal.app.names import safe_name
 from pkmcal.checks.check_geometry import check_geometry
-from pkmcal.exceptions import Error
+from pkmcal.exceptions import ArgumentError, Error
 from pkmcal.files.reading import MOST_TABLE
 from pkmcal.geometry.controller import Controller
 from pkmcal.jobs import calibrating, exporting, importing, planning
@@ -59,9 +61,9 @@ class Work:
     def read(self, project: Project) -> calibrating.Sources:
         """Read the files of a calibration, if they or what is asked of them changed."""
         job = project.calibration
-        files = (each for each in Path().glob("*") if each.is_file())
-        times = ((each.name, each.stat().st_mtime_ns, each.stat().st_size) for each in files)
-        key = (job.sources, tuple(sorted(times)))
+        files = [each for each in map(Path, named(project)) if each.is_file()]
+        times = ((str(each), each.stat().st_mtime_ns, each.stat().st_size) for each in files)
+        key = (job.sources, tuple(times))
         if self.sources is None or key != self.key:
             inputs, notes = Inputs(), list[str]()
             self.sources = calibrating.read(job, inputs, notes.append)
@@ -163,12 +165,16 @@ def out(work: Work, state: Table, given: Table, say: Say) -> Table:
     robot = sources.robot
     if isinstance(robot, pk.Robot) and robot.model.controller:
         exports.insert(0, own_export(robot.model.controller, f"{REPORT}/robot.toml"))
+    inputs = {each.resolve() for each in work.inputs.paths}
     changed: list[str] = []
     for number, job in enumerate(exports):
         say(f"writing {job.out}", 0.3 + 0.6 * number / len(exports))
         name = str(job.out)
         try:
-            files.append(_file(name, str(exporting.run(job, Inputs(), force=True))))
+            if Path(name).resolve() in inputs:
+                raise ArgumentError(f"{name} is an input: give your file another name")
+            said = str(exporting.run(job, Inputs(), force=True))
+            files.append(_file("" if Path(name).is_dir() else name, f"{name}: {said}"))
         except Error as error:
             files.append(_file("", str(error)))
             continue
@@ -221,20 +227,18 @@ OPERATIONS: dict[str, Callable[[Work, Table, Table, Say], Table]] = {
 
 
 def told(error: BaseException) -> Table:
-    """Return an error's words, and the file, line and column that it names."""
+    """Return an error's words, and the file and line that they begin with."""
     found: Table = {"message": str(error)}
-    for name in ("file", "line", "column"):
-        value = getattr(error, name, None)
-        if isinstance(value, str | int):
-            found[name] = value
-    return found
+    place = re.match(r"(?:.*/)?([^/:]+), line (\d+)\b", found["message"])
+    return {**found, "file": place[1], "line": int(place[2])} if place else found
 
 
 def own_export(controller: Controller, robot: str) -> Exporting:
     """Return what writes a robot file into the configuration that it was made of."""
-    words = shlex.split(controller.command(robot))
-    options = dict(zip(words[3::2], words[4::2], strict=True))
-    return Exporting(robot, options["--as"], options["--out"], config=options.get("--config"))
+    config = controller.file or None
+    if config is not None and Path(config).name != config:
+        raise ArgumentError(f"the robot file's controller: {config} is not a file of this project")
+    return Exporting(robot, controller.firmware, safe_name(controller.new), config=config)
 
 
 def _head(name: str) -> list[str]:

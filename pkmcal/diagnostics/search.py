@@ -66,14 +66,24 @@ def _level_of_weak(found: Solution, weak: Weak) -> Level:
 
 
 def _undetermined(found: Solution) -> tuple[str, ...]:
-    """Numbers of effects, by name, of which the measurements say nothing."""
-    of_effects = {*coefficients(found.fit.equations.prediction.datasets)}
-    if not found.gauges:  # else compliances are known but for the scale of forces, which is said
-        of_effects |= {*found.fit.parameters.asked.of_effects}
-    return tuple(
+    """Numbers of effects, by name, of which the measurements say nothing.
+
+    Of the machine's own numbers that effects free, such as compliances, only if they say nothing
+    of all: that of a joint which gravity does not turn has no influence. With a gauge they are
+    known but for the scale of forces, which is said.
+    """
+    coefficient = {*coefficients(found.fit.equations.prediction.datasets)}
+    freed = found.fit.parameters.asked.of_effects
+    undetermined = [
         name
         for name, sigma in zip(found.free, found.stderr.tolist(), strict=True)
-        if name.partition("@")[0] in of_effects and not np.isfinite(sigma)
+        if not np.isfinite(sigma)
+    ]
+    nothing = not found.gauges and freed.keys() <= {*undetermined}
+    return tuple(
+        name
+        for name in undetermined
+        if name.partition("@")[0] in coefficient or (nothing and name in freed)
     )
 
 

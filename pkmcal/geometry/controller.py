@@ -29,8 +29,13 @@ class Controller:
     def command(self, robot: str) -> str:
         """What writes a robot file for it, on the command line."""
         config = f" --config {quote(self.file)}" if self.file else ""
-        suffix = Path(self.file).suffix or ".g"
-        return f"pkmcal export {quote(robot)} --as {self.firmware}{config} --out new{suffix}"
+        out = quote(self.new)
+        return f"pkmcal export {quote(robot)} --as {self.firmware}{config} --out {out}"
+
+    @property
+    def new(self) -> str:
+        """Name of the configuration with the changed numbers."""
+        return f"new{Path(self.file).suffix or '.g'}"
 
 
 def read_controller(table: Table) -> Controller:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import unicodedata
 from pathlib import Path
 
@@ -11,6 +12,8 @@ from hypothesis import strategies as st
 
 from pkmcal.app.folder import Folder
 from pkmcal.app.names import safe_name
+from pkmcal.app.work import own_export
+from pkmcal.geometry.controller import Controller
 
 HOSTILE = [
     "../x.csv",
@@ -66,7 +69,7 @@ def test_names_of_ordinary_files_stay() -> None:
 
 def test_a_file_of_the_users_never_takes_the_place_of_the_projects(tmp_path: Path) -> None:
     folder = Folder(tmp_path / "project")
-    for name in ("project.toml", "robot.toml", "commands.csv", "x.part"):
+    for name in ("project.toml", "robot.toml", "new.cfg", "machine.h", "plan", "x.part"):
         part = folder.path / ".sent"
         part.write_text("mine")
         assert folder.store(name, part) == f"my_{name}"
@@ -86,6 +89,34 @@ def test_what_is_not_in_the_folder_is_not_given(tmp_path: Path, path: str) -> No
     (folder.path / "mine.csv").write_text("x")
     assert folder.written(path) is None
     assert folder.written("mine.csv") == folder.path / "mine.csv"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '[import]\nfile = "/etc/printer.cfg"\nout = "machine"',
+        '[import]\nfile = "printer.cfg"\nout = "../elsewhere"',
+        '[import]\nfile = "printer.cfg"',
+        '[machine]\nfile = "../robot.toml"',
+    ],
+)
+def test_a_project_written_by_hand_does_not_lead_out_of_the_folder(
+    tmp_path: Path, text: str
+) -> None:
+    (tmp_path / "project.toml").write_text(f"pkmcal-project = 1\n{text}\n")
+    with pytest.raises(ValueError, match="within this project"):
+        Folder(tmp_path)
+
+
+@pytest.mark.parametrize("file", ["/etc/passwd", "../printer.cfg", "a/../../b.cfg"])
+def test_the_controller_of_a_robot_file_leads_to_no_file_elsewhere(file: str) -> None:
+    with pytest.raises(ValueError, match="is not a file of this project"):
+        own_export(Controller("klipper", file), "report/robot.toml")
+
+
+def test_a_command_that_is_to_be_copied_is_one_command() -> None:
+    words = shlex.split(Controller("klipper", "a.$(touch x) y").command("robot.toml"))
+    assert words[-1] == "new.$(touch x) y" and len(words) == 9
 
 
 def test_a_change_of_an_old_version_is_not_taken_and_undo_goes_back(tmp_path: Path) -> None:

@@ -85,8 +85,17 @@ export async function work(operation, words, given) {
   }
 }
 
-// Change the project by a function of a copy of its table; false if another tab was first.
-export async function change(edit) {
+let last = Promise.resolve()
+
+// Change the project by a function of a copy of its table, one change after the other; false if
+// another tab was first.
+export function change(edit) {
+  const changed = last.then(() => changing(edit))
+  last = changed.catch(() => {})
+  return changed
+}
+
+async function changing(edit) {
   const table = structuredClone(app.project.state)
   edit(table)
   for (const [name, part] of Object.entries(table)) if (part && typeof part === 'object' && !Object.keys(part).length) delete table[name]
@@ -120,20 +129,22 @@ export function frame() {
   $('undo').onclick = () => attempt(undo)
   const lines = project.commands[app.step] ?? []
   $('terminal').hidden = !lines.length
-  $('terminal').querySelector('pre').textContent = [`cd ${project.folder}`, ...lines].join('\n')
+  $('terminal').querySelector('pre').textContent = [project.enter, ...lines].join('\n')
   $('terminal').querySelector('button').onclick = () => attempt(() => navigator.clipboard.writeText($('terminal').querySelector('pre').textContent))
 }
 
 export async function go(step, focus = true) {
+  if (!ready[step](app.project)) step = 'machine' // as after undo
   app.step = step
   app.picture?.machine?.dispose?.()
   app.picture = null
   frame()
   const main = $('main')
-  main.replaceChildren()
+  const screen = made('div', null) // what a screen before still adds is not seen
+  main.replaceChildren(screen)
   main.className = step
   if (focus) main.focus({ preventScroll: true })
-  await attempt(() => app.screens[step](main))
+  await attempt(() => app.screens[step](screen))
 }
 
 // A place to drop files, and a button for those who do not drag.

@@ -1,5 +1,5 @@
 // What is taken away: the changed configuration, the calibrated machine, the report.
-import { app, button, change, choice, field, frame, made, work } from './frame.js'
+import { app, attempt, button, change, choice, field, frame, made, work } from './frame.js'
 import { save } from './transport.js'
 
 const STATEMENTS = ['machine', 'serial', 'customer', 'operator', 'date', 'instrument', 'temperature', 'method']
@@ -31,7 +31,7 @@ export async function out(main) {
   made('button', form, { text: 'Write the report' })
   form.onsubmit = event => {
     event.preventDefault()
-    write()
+    attempt(write)
   }
   const write = async () => {
     const stated = Object.fromEntries(STATEMENTS.filter(name => fields[name].value).map(name => [name, fields[name].value]))

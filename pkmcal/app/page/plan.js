@@ -1,5 +1,5 @@
 // Where to measure, so that a calibration knows best where the machine goes.
-import { app, button, change, choice, field, made, work } from './frame.js'
+import { app, attempt, button, change, choice, field, made, work } from './frame.js'
 import { draw } from './picture.js'
 import { save } from './transport.js'
 
@@ -17,7 +17,7 @@ export async function plan(main) {
   made('button', form, { className: 'first', text: 'Choose poses' })
   form.onsubmit = event => {
     event.preventDefault()
-    choose()
+    attempt(choose)
   }
   const choose = async () => {
     const asked = { kind: kind.value }

@@ -1,5 +1,5 @@
 // How good it is: the verdict first, then rows, numbers and the picture, each of which refits.
-import { app, button, change, choice, field, go, made, tick, work } from './frame.js'
+import { app, attempt, button, change, choice, field, made, work } from './frame.js'
 import { draw, selected } from './picture.js'
 
 const LEAST = 400 // rows that are listed at first: the worst
@@ -35,7 +35,8 @@ export async function result(main) {
     made('pre', parts.table, { text: found.summary, tabindex: 0 })
     for (const each of found.numbers) before[each.name] = each.stderr
     if (found.view) await draw(picture, found.view, row => mark(row, true))
-    main.dataset.fits = +main.dataset.fits + 1
+    const counter = document.getElementById('main').dataset
+    counter.fits = +counter.fits + 1
   }
   pick(app.part ?? 'rows')
   await refit()
@@ -57,7 +58,8 @@ function say(section, { verdict }, refit) {
 
 function held(parent, refit) {
   parent.replaceChildren()
-  const fit = app.project.state.fit ?? {}, files = app.project.files.filter(name => /\.(csv|tsv|txt|xlsx)$/i.test(name))
+  const { fit = {}, measured = {} } = app.project.state, used = [...(measured.files ?? []), measured.controller]
+  const files = app.project.files.filter(name => /\.(csv|tsv|txt|xlsx)$/i.test(name) && !used.includes(name))
   const set = (name, value) => refit(table => { if (value) table[name] = value; else delete table[name] })
   choice(parent, 'hold out', [['', 'nothing'], ['0.2', 'a fifth of the poses'], ['0.5', 'half of the poses'], ...files.map(f => [f, f])], fit.holdout ?? '', value => set('holdout', value))
   choice(parent, 'outliers', [['', 'count in full'], ['huber', 'count less'], ['cauchy', 'hardly count']], fit.loss ?? '', value => set('loss', value))
@@ -75,20 +77,24 @@ const placeOf = ({ file, line, row }) => (line > 0 ? `${file}:${line}` : `row ${
 
 function rows(parent, found, refit) {
   parent.replaceChildren()
-  const drop = app.project.state.fit?.drop ?? []
   const wide = made('div', parent, { className: 'wide', tabindex: 0, role: 'region', 'aria-label': 'measured rows' })
   const table = made('table', wide)
   made('caption', table, { text: 'Measured rows, worst first: the distance from where the machine is, mm' })
   made('tr', table, {}, ...['use', 'row', 'line', 'before', 'after'].map(text => made('th', null, { text, scope: 'col' })))
   const use = (line, each, kept) => {
-    const place = each.line > 0 ? `${each.file}:${each.line}` : String(each.row)
+    const number = String(each.row)
     const box = made('input', made('td', line), { type: 'checkbox', 'aria-label': `use row ${each.row}` })
     box.checked = kept
     box.onclick = event => event.stopPropagation()
-    box.onchange = () => refit(fit => {
-      fit.drop = box.checked ? drop.filter(one => one !== place && one !== String(each.row)) : [...drop, place]
+    box.onchange = () => attempt(() => refit(fit => { // by number: a line may have several rows
+      const out = new Set((fit.drop ?? []).flatMap(one => one.split(',').map(part => part.trim())))
+      if (fit['drop-outliers']) for (const one of found.dropped) out.add(String(one.row))
+      delete fit['drop-outliers']
+      if (box.checked) for (const one of [number, `${each.file}:${each.line}`]) out.delete(one)
+      else out.add(number)
+      fit.drop = [...out]
       if (!fit.drop.length) delete fit.drop
-    })
+    }))
   }
   for (const each of found.dropped) {
     const line = made('tr', table, { className: 'out', id: `row-${each.row}` })
