@@ -70,7 +70,7 @@ class _Compared:
     def of(cls, found: Solution) -> _Compared:
         sure = found.fit.uncertainty
         odd = np.isin(sure.equations.table.rows, found.outliers)[sure.labels.row]
-        use = np.flatnonzero(~odd)
+        use = sure.fit.without_idle(np.flatnonzero(~odd))
         use = use[:: max(1, -(-len(use) // _MOST))]
         group = numbered(sure.labels.set_of[use], sure.labels.family[use])
         return cls(found, use, group, sure.fit.design[use])

@@ -86,6 +86,7 @@ def apart(found: Solution) -> Apart | None:
     visits = visits_of(found)
     row = sure.labels.row
     use = np.flatnonzero(~np.isin(sure.equations.table.rows, found.outliers)[row])
+    use = sure.fit.without_idle(use)
     key = numbered(visits.series[row][use], visits.visit[row][use], sure.labels.component[use])
     groups = dict(_groups(found, visits))
     cell = np.zeros(len(row), dtype=np.intp)

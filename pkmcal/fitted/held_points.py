@@ -256,10 +256,14 @@ def odd_rows(points: Points, row: IntArray, count: int, uncertainty: Uncertainty
 
 
 def _floored(points: Points) -> FloatArray:
-    """`Points.own`, no family's below a trace of its median."""
+    """`Points.own`, no family's below a trace of its median, or of all where that is nothing.
+
+    Angles of a machine that cannot turn are all 0 in many files, and so is what is left of them.
+    """
     own: FloatArray = points.own.copy()
+    every = max(float(own[points.known].max(initial=0.0)), np.finfo(np.float64).tiny / _NOTHING)
     for _, mine in _each_unit(points):
-        own[mine] = np.maximum(own[mine], _NOTHING * float(np.median(own[mine])))
+        own[mine] = np.maximum(own[mine], _NOTHING * (float(np.median(own[mine])) or every))
     return own
 
 

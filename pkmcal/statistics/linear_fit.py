@@ -76,6 +76,16 @@ class LinearFit:
         """Number of cluster and component of each equation, (M,)."""
         return numbered(self.cluster, self.component)
 
+    def without_idle(self, use: IntArray) -> IntArray:
+        """Equations `use` without those of a component that cannot move and was read as exactly 0.
+
+        Such are angles of a delta in files of its controller: no noise, and no degrees of freedom.
+        """
+        exact = np.flatnonzero(self.residual[use] == 0.0)
+        idle = exact[~(self.design[use[exact]] != 0.0).any(axis=1)]
+        kept: IntArray = np.delete(use, idle)
+        return kept
+
 
 def linear_fit(
     jacobian: FloatArray,

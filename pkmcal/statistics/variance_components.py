@@ -117,6 +117,15 @@ class _Point:
         return matrix
 
 
+def _solved(matrix: FloatArray, slope: FloatArray) -> FloatArray:
+    """Newton's step; the shortest where a class of nothing but zeros leaves a direction open."""
+    try:
+        step = np.linalg.solve(matrix, slope)
+    except np.linalg.LinAlgError:
+        step = np.linalg.lstsq(matrix, slope, rcond=None)[0]
+    return np.asarray(step, dtype=np.float64)
+
+
 class _Model:
     """The restricted likelihood of a fit whose classes of equations have their own variances."""
 
@@ -176,7 +185,7 @@ class _Model:
             matrix = here.curvature
             if not np.linalg.eigvalsh(matrix)[0] > 0:
                 matrix = here.by_logarithms
-            step = np.clip(np.linalg.solve(matrix, here.slope), -_STEP, _STEP)
+            step = np.clip(_solved(matrix, here.slope), -_STEP, _STEP)
             if np.abs(step).max() < _SETTLED:
                 break
             further = None
