@@ -121,6 +121,13 @@ class _Compared:
         return float(-0.5 * (count * np.log(variance)).sum()), np.sqrt(variance)[self.group]
 
 
+def _fills(given: Measurements, other: Measurements) -> bool:
+    """Whether a column of nothing but 0, which takes no part, would have numbers."""
+    before, after = (m.values.reshape(len(m), -1) for m in (given, other))
+    still = (before == 0.0).all(axis=0)
+    return bool(np.any(after[:, still] != 0.0))
+
+
 def likelier_reading(found: Solution) -> Likelier | None:
     """The likeliest other reading, if it is far likelier than the one that was given."""
     sure = found.fit.uncertainty
@@ -136,6 +143,7 @@ def likelier_reading(found: Solution) -> Likelier | None:
         for i, given in enumerate(sets)
         if given.components
         for words, other in other_values(given)
+        if not _fills(given, other)
     }
     if not trials:
         return None

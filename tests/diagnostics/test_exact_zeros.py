@@ -46,7 +46,8 @@ def test_noise_about_zero_is_in_no_other_unit(column: int) -> None:
     """Angles that are noise alone get smaller in milliradians, whatever they are."""
     for seed in range(4):
         robot, m = poses("rotary-delta", seed, noisy=(column,))
-        found = pk.identify(robot, m)
+        sigma = [NOISE] * 3 + [TURNING] * 3
+        found = pk.identify(robot, pk.Measurements(m.actuators, m.values, "pose", sigma=sigma))
         assert not [said for said in found.verdict.said if said.check == "other-reading"]
 
 
