@@ -7,6 +7,8 @@ import shlex
 import sys
 from pathlib import Path
 
+from pkmcal.files.atomic import write_whole
+
 _ENTRY = """[Desktop Entry]
 Type=Application
 Name=pkmcal
@@ -31,5 +33,5 @@ def install(data: Path | None = None) -> Path:
     project = Path.home() / "pkmcal-project"
     command = shlex.join([sys.executable, "-m", "pkmcal", "app", str(project)])
     path = folder / "pkmcal.desktop"
-    path.write_text(_ENTRY.format(command=command.replace("%", "%%")), encoding="utf-8")
+    write_whole(path, _ENTRY.format(command=command.replace("%", "%%")))
     return path

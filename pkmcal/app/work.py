@@ -23,6 +23,7 @@ from pkmcal.app.folder import named
 from pkmcal.app.names import safe_name
 from pkmcal.checks.check_geometry import check_geometry
 from pkmcal.exceptions import ArgumentError, Error
+from pkmcal.files.atomic import write_whole
 from pkmcal.files.reading import MOST_TABLE
 from pkmcal.geometry.controller import Controller
 from pkmcal.jobs import calibrating, exporting, importing, planning
@@ -192,7 +193,7 @@ def report(work: Work, state: Table, given: Table, say: Say) -> Table:
     certificate = given.get("certificate")
     if certificate:
         say("certificate", 0.1)
-        Path("certificate.toml").write_text(telling.certificate(certificate), encoding="utf-8")
+        write_whole("certificate.toml", telling.certificate(certificate))
     say("report", 0.3)
     asked = Writing(
         report=REPORT, certificate="certificate.toml" if certificate else None, force=True
