@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from pkmcal.diagnostics.machine import CHECKS
+from pkmcal.readings.registry import KINDS
 
 CHECK = {check.name: check for check in CHECKS}
 
@@ -39,7 +40,7 @@ def test_poses_that_touch_closer_together_than_before_are_said(
     before = np.random.default_rng(6).normal(0, 100, (10 * len(kinds), 3))
     after = before * (1.0 - share) + [50.0, -20.0, 7.0]
     after[10:] = before[10:] * 0.5  # of the other sets
-    sets = [SimpleNamespace(kind=kind) for kind in kinds]
+    sets = [SimpleNamespace(instrument=KINDS[kind]) for kind in kinds]
     places = np.split(np.arange(len(before)), len(kinds))
     equations: Any = SimpleNamespace(table=SimpleNamespace(sets=sets, pose_of=places))
     start, end = evaluated(before), evaluated(after)
