@@ -20,6 +20,7 @@ import numpy as np
 
 import pkmcal as pk
 from pkmcal.arrays import FloatArray
+from pkmcal.jobs.planned_camera import looking
 from pkmcal.readings import Board, Camera
 
 LENS = {
@@ -96,17 +97,6 @@ class Tally(NamedTuple):
     inside: float
     actuators: float
     seconds: float
-
-
-def looking(eye: FloatArray, at: FloatArray) -> FloatArray:
-    """The base (4, 4) in axes of a camera at `eye` that looks at a point, x level."""
-    ahead = (at - eye) / np.linalg.norm(at - eye)
-    right = np.cross(ahead, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right)
-    motion = np.eye(4)
-    motion[:3, :3] = [right, np.cross(ahead, right), ahead]
-    motion[:3, 3] = -motion[:3, :3] @ eye
-    return motion
 
 
 def instrument(scenario: Scenario) -> tuple[Camera, Board]:

@@ -16,7 +16,9 @@ from pkmcal.app.commands import OUTPUTS, PLAN, REPORT
 from pkmcal.app.names import safe_name
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.atomic import write_whole
+from pkmcal.jobs.machine import is_built_in
 from pkmcal.jobs.project import Project
+from pkmcal.jobs.reading import board_file
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -150,18 +152,16 @@ def _refuse_elsewhere(project: Project) -> None:
 
 def _is_own(name: str) -> bool:
     """Whether pkmcal writes, or may write, a file or folder of this name."""
-    return name in OWN or name.startswith("new.") or name.endswith(".part")
+    return name in OWN or name.startswith(("new.", "for_")) or name.endswith(".part")
 
 
 def named(project: Project) -> list[str]:
     """Return the files that a project names, the machine's first."""
     job, plan, importing = project.calibration, project.plan, project.importing
     reading = job.reading
-    boards = (
-        each for each in (reading.board, plan.board) if each and each.lower().endswith(".csv")
-    )
+    boards = (board_file(reading.board), board_file(plan.board))
     configuration = (importing.file, importing.log) if importing else ()
-    machine = job.table().get("machine", {}).get("file")
+    machine = None if is_built_in(job.robot) else job.robot
     read = (reading.controller, reading.columns, reading.camera, job.held_file)
     others = (*read, *boards, plan.poses, plan.targets, plan.camera)
     return [name for name in (machine, *configuration, *job.files, *others) if name]

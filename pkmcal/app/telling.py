@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray
 from pkmcal.calibration.identification import Identification
 from pkmcal.checks.finding import Finding
@@ -33,11 +32,6 @@ def finding(found: Finding) -> Table:
     return {"what": found.what, "suggestion": found.suggestion}
 
 
-def free(robot: Robot | SerialArm) -> Sequence[str]:
-    """Return the names of all numbers of a machine."""
-    return tuple(as_machine(robot).geometry.names)
-
-
 def calibration(found: Identification, job: Calibration, lines: Sequence[tuple[str, int]]) -> Table:
     """Return what a page shows of a fit.
 
@@ -50,23 +44,22 @@ def calibration(found: Identification, job: Calibration, lines: Sequence[tuple[s
     lines : sequence of (str, int)
         File and line of each row.
     """
-    verdict = found.verdict
+    verdict, free = found.verdict, set(found.free)
+    names = list(as_machine(found.robot).geometry.names)
     rows, left_out, arrows = _rows(found, lines)
     return {
         "name": found.robot.name,
         "verdict": {
             "state": verdict.state,
-            "first": str(verdict).partition("\n")[0] if not verdict.reasons else "",
             "text": str(verdict),
             "said": [_said(each, job) for each in verdict.said],
         },
         "summary": found.summary(),
         "rows": rows,
         "numbers": _numbers(found),
-        "machine": list(free(found.robot)),
-        "others": [name for name in free(found.robot) if name not in set(found.free)],
+        "machine": names,
+        "others": [name for name in names if name not in free],
         "dropped": left_out,
-        "outliers": [int(row) for row in found.outliers],
         "view": _view(found, arrows),
     }
 

@@ -39,7 +39,6 @@ from pkmcal.view import page
 Table = dict[str, Any]
 Say = Callable[..., None]
 _LINES = 12  # of a file that are shown as they are
-_CANDIDATES = 500
 
 
 @dataclass
@@ -103,7 +102,6 @@ def machine(work: Work, state: Table, given: Table, say: Say) -> Table:
         "findings": [telling.finding(each) for each in found.findings],
         "notes": notes,
         "stored": [str(folder / name) for name in stored],
-        "free": list(telling.free(robot)),
         "view": page.machine(robot),
     }
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
-from pkmcal.jobs.machine import in_folder, machine_of_table, machine_table
+from pkmcal.jobs.machine import OfMachine
 from pkmcal.jobs.stated import PathText, Refuse, Stated, command, of, refused
 
 
@@ -58,7 +58,7 @@ class Importing(Stated):
 
 
 @dataclass(frozen=True)
-class Exporting(Stated):
+class Exporting(OfMachine):
     """A machine that is written for a controller: what the options of `pkmcal export` say.
 
     Examples
@@ -70,9 +70,8 @@ class Exporting(Stated):
     True
     """
 
-    OWNER = "[export]"
+    OWNER, TABLE = "[export]", "export"
 
-    robot: str = field(default="", metadata={"argument": True})
     target: str = field(default="", metadata={"option": "as"})
     out: PathText | None = None
     number: str | None = None
@@ -82,25 +81,3 @@ class Exporting(Stated):
     def argv(self) -> list[str]:
         """The command line that says the same."""
         return command("export", [self.robot], self.options())
-
-    def table(self) -> dict[str, Any]:
-        """Tables of a project file: machine and export."""
-        found = {"machine": machine_table(self.robot), "export": super().table()}
-        return {name: table for name, table in found.items() if table}
-
-    @classmethod
-    def of_table(cls, table: Mapping[str, Any], refuse: Refuse | None = None) -> Exporting:
-        """What the tables machine and export say; others are not looked at.
-
-        Raises
-        ------
-        ValueError
-            An unknown key, or a value that is none of this key.
-        """
-        refuse = refuse or refused
-        robot = machine_of_table(*of(table, "machine", refuse))
-        return cls(robot, **cls.values_of_table(*of(table, "export", refuse)))
-
-    def in_folder(self, folder: str) -> Exporting:
-        """The same with its relative paths below a folder: those of a project file."""
-        return replace(super().in_folder(folder), robot=in_folder(self.robot, folder))

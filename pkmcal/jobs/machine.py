@@ -3,10 +3,44 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from importlib import resources
-from typing import Any
+from typing import Any, ClassVar, TypeVar
 
-from pkmcal.jobs.stated import Refuse, below
+from pkmcal.jobs.stated import Refuse, Stated, below, of, refused
+
+M = TypeVar("M", bound="OfMachine")
+
+
+@dataclass(frozen=True)
+class OfMachine(Stated):
+    """A job of a machine that has a table of its own in a project file, `TABLE`."""
+
+    TABLE: ClassVar[str] = ""
+
+    robot: str = field(default="", metadata={"argument": True})
+
+    def table(self) -> dict[str, Any]:
+        """Tables of a project file: machine, and its own."""
+        found = {"machine": machine_table(self.robot), self.TABLE: super().table()}
+        return {name: table for name, table in found.items() if table}
+
+    @classmethod
+    def of_table(cls: type[M], table: Mapping[str, Any], refuse: Refuse | None = None) -> M:
+        """What the table machine and its own say; others are not looked at.
+
+        Raises
+        ------
+        ValueError
+            An unknown key, or a value that is none of this key.
+        """
+        refuse = refuse or refused
+        robot = machine_of_table(*of(table, "machine", refuse))
+        return cls(robot, **cls.values_of_table(*of(table, cls.TABLE, refuse)))
+
+    def in_folder(self: M, folder: str) -> M:
+        """The same with its relative paths below a folder: those of a project file."""
+        return replace(super().in_folder(folder), robot=in_folder(self.robot, folder))
 
 
 def machine_table(robot: str) -> dict[str, str]:

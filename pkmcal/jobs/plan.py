@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from typing import Any
+from dataclasses import dataclass, replace
 
-from pkmcal.jobs.machine import in_folder, machine_of_table, machine_table
-from pkmcal.jobs.stated import PathText, Refuse, Stated, below, command, of, refused
+from pkmcal.jobs.machine import OfMachine
+from pkmcal.jobs.reading import board_file
+from pkmcal.jobs.stated import PathText, below, command
 
 
 @dataclass(frozen=True)
-class Planning(Stated):
+class Planning(OfMachine):
     """A plan of poses: a machine, and what the options of `pkmcal plan` say.
 
     Examples
@@ -23,9 +22,8 @@ class Planning(Stated):
     True
     """
 
-    OWNER = "[plan]"
+    OWNER, TABLE = "[plan]", "plan"
 
-    robot: str = field(default="", metadata={"argument": True})
     count: int | None = None
     accuracy: float | None = None
     poses: PathText | None = None
@@ -54,27 +52,8 @@ class Planning(Stated):
         """The command line that says the same, without what is written."""
         return command("plan", [self.robot], self.options())
 
-    def table(self) -> dict[str, Any]:
-        """Tables of a project file: machine and plan."""
-        found = {"machine": machine_table(self.robot), "plan": super().table()}
-        return {name: table for name, table in found.items() if table}
-
-    @classmethod
-    def of_table(cls, table: Mapping[str, Any], refuse: Refuse | None = None) -> Planning:
-        """What the tables machine and plan say; others are not looked at.
-
-        Raises
-        ------
-        ValueError
-            An unknown key, or a value that is none of this key.
-        """
-        refuse = refuse or refused
-        robot = machine_of_table(*of(table, "machine", refuse))
-        return cls(robot, **cls.values_of_table(*of(table, "plan", refuse)))
-
     def in_folder(self, folder: str) -> Planning:
         """The same with its relative paths below a folder: those of a project file."""
-        found = replace(super().in_folder(folder), robot=in_folder(self.robot, folder))
-        if self.board is None or not self.board.lower().endswith(".csv"):
-            return found
-        return replace(found, board=below(folder, self.board))
+        found = super().in_folder(folder)
+        board = board_file(self.board)
+        return found if board is None else replace(found, board=below(folder, board))

@@ -37,7 +37,7 @@ def planned_camera(job: Planning) -> Camera:
     aim = _numbers("--look-at", job.look_at, (3,))
     if word("--camera-on", job.camera_on, get_args(Mount)) == "base":
         eye = _numbers("--camera-at", at, (3,))
-        stands = _looking(eye, aim)
+        stands = looking(eye, aim)
         up = _laid(np.zeros(3), np.pi if eye[2] > aim[2] else 0.0, middle)
         own = Camera.from_file(lens, on="base", stands=screw.to_pose(stands))
         return own.with_fields({"carried": screw.to_pose(up), "board": seen})
@@ -65,7 +65,7 @@ def _laid(place: FloatArray, turn: float, middle: FloatArray) -> FloatArray:
     return motion
 
 
-def _looking(eye: FloatArray, at: FloatArray) -> FloatArray:
+def looking(eye: FloatArray, at: FloatArray) -> FloatArray:
     """The base (4, 4) in axes of a camera that looks at a point, its x level."""
     away = at - eye
     if not np.linalg.norm(away) > 0.0:

@@ -89,9 +89,13 @@ class Reading(Stated):
     def in_folder(self, folder: str) -> Reading:
         """The same with its relative paths below a folder."""
         found = super().in_folder(folder)
-        if self.board is None or not self.board.lower().endswith(".csv"):
-            return found
-        return replace(found, board=below(folder, self.board))
+        board = board_file(self.board)
+        return found if board is None else replace(found, board=below(folder, board))
+
+
+def board_file(board: str | None) -> str | None:
+    """The file of a board's own points; None of a board that words describe."""
+    return board if board is not None and board.lower().endswith(".csv") else None
 
 
 def _renamed(text: str) -> tuple[str, str]:
