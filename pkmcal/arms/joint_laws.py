@@ -1,4 +1,4 @@
-"""What joints of an arm add to their commands: sag, gears, coupled axes, backlash.
+"""Laws that joints of an arm add to their commands: sag, gears, coupled axes, backlash.
 
 Of each joint q̃ = q + Σ v φ(q), linear in numbers v that are given or identified:
 
@@ -69,7 +69,7 @@ class Term(NamedTuple):
 
 
 def sag_term(joint: int, link: int, axis: int) -> Term:
-    """What a moment of a link along an axis, all counted from 0, turns a joint."""
+    """Return the angle by which a unit moment of a link turns a joint about an axis, from 0."""
     return Term(joint, "sag", 3 * link + axis)
 
 
@@ -175,7 +175,7 @@ class JointLaws:
 
     @cached_property
     def yielding(self) -> bool:
-        """Whether a joint has a compliance."""
+        """True if a joint has a compliance."""
         return any(term.kind == "compliance" for term in self.numbers)
 
     @cached_property
@@ -216,7 +216,7 @@ class JointLaws:
     # what joints add ------------------------------------------------------------------------------
 
     def moved(self, theta: FloatArray) -> FloatArray:
-        """Where joints (N, n) are that are commanded to `theta` (N, n)."""
+        """Return the true joint coordinates (N, n) at the commands `theta` (N, n)."""
         found: FloatArray = theta.copy()
         np.add.at(found.T, self._joint, (self.basis(theta) * self.values).T)
         return found
@@ -282,7 +282,7 @@ class JointLaws:
 
     @cached_property
     def _sagging(self) -> bool:
-        """Whether products of gravity matter."""
+        """True if products of gravity matter."""
         return any(term.kind == "sag" for term in self.numbers)
 
     def _from(self, joint: int) -> FloatArray:
@@ -300,7 +300,7 @@ class JointLaws:
 
     @cached_property
     def _sags(self) -> FloatArray:
-        """What unit moments of the links turn each joint, (n, n, 3)."""
+        """Return how far unit moments of the links turn each joint, (n, n, 3)."""
         found = np.zeros((self._n, self._n, 3))
         for (joint, kind, of), value in zip(self.terms, self.values.tolist(), strict=True):
             if kind == "sag":
@@ -309,7 +309,7 @@ class JointLaws:
 
     @cached_property
     def _compliances(self) -> FloatArray:
-        """Of each joint (n,), rad/(N mm)."""
+        """Return the compliance of each joint (n,), rad/(N mm)."""
         found = np.zeros(self._n)
         for (joint, kind, _), value in zip(self.terms, self.values.tolist(), strict=True):
             if kind == "compliance":

@@ -78,7 +78,7 @@ class Pieces:
         return "".join(text)
 
     def _commands(self, moves: Sequence[Move], which: IntArray, points: FloatArray) -> FloatArray:
-        """What to write for points, going on from the command before."""
+        """Return the commands for points, continuing from the command before."""
         carried = np.array([move.carried for move in moves], dtype=np.intp)
         commands = self._machine.command(points, carried[which])
         unreached = which[~np.isfinite(commands).all(axis=1)]

@@ -98,7 +98,7 @@ def _linear(robot: Robot, project: bool) -> tuple[Values, tuple[float, ...], Los
 
 
 def _rotary(robot: Robot, project: bool) -> tuple[Values, tuple[float, ...], Loss]:
-    """The same of a rotary delta, rad a step."""
+    """Return the settings of a rotary delta, rad a step."""
     firmware, loss = rotary_delta.of_robot(robot, project, one_height=True)
     values = {("printer", "shoulder_radius"): firmware.radius}
     values["printer", "shoulder_height"] = firmware.heights[0]

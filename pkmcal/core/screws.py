@@ -51,7 +51,7 @@ def frames(pose: FloatArray) -> FloatArray:
 
 
 class Links(NamedTuple):
-    """What is between the joints of an arm: shared by all rows, or of each row.
+    """The links between the joints of an arm: shared by all rows, or of each row.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Whether residuals are what the stated sigma says, and enough of them show the noise."""
+"""Check whether residuals are what the stated sigma says, and enough of them show the noise."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def _too_noisy(found: Solution) -> tuple[float, ...]:
 
 
 def _too_noisy_text(found: Solution, scale: float) -> str:
-    """What is wrong and what helps: repeats decide between the two causes."""
+    """Describe what is wrong and what helps: repeats decide between the two causes."""
     wrong = f"residuals are {scale:.3g} times what sigma says"
     scatter = found.fit.uncertainty.repeats().scatter
     if scatter**2 > NOISY:

@@ -1,4 +1,4 @@
-"""What readings show of themselves, and poses that turn too little for what has to be found."""
+"""Doubts about readings by themselves, and poses that turn too little for what is free."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def _doubted(found: Solution) -> tuple[str, ...]:
 
 
 def scale_by_one(found: Solution) -> str | None:
-    """What alone tells how large the machine is, in a word; None where something else does."""
+    """Name the one thing that tells how large the machine is; None where there are several."""
     machine = found.fit.end.robot
     by = {m.instrument.scaled_by for m in found.fit.uncertainty.equations.table.sets}
     if len(by) != 1 or "" in by:

@@ -120,7 +120,7 @@ class Coupling:
 
 @dataclass(frozen=True)
 class Backlash:
-    """How much further a joint is after a fall of its reading than after a rise.
+    """Backlash: the way of a joint after a fall of its reading beyond that after a rise.
 
     The measurements say from where each joint came (`Measurements.approach`).
 

@@ -51,7 +51,7 @@ class InstrumentScale:
 
 @dataclass(frozen=True)
 class ScaledRows:
-    """How readings of one set follow the scale.
+    """Readings of one set as functions of the scale.
 
     Attributes
     ----------
@@ -72,7 +72,7 @@ class ScaledRows:
         rows: IntArray,
         numbers: Mapping[str, FloatArray],
     ) -> Moved:
-        """How the platform would have to move at poses (N, 6) for the same readings."""
+        """Compute the motion of the platform at poses (N, 6) that would give the same readings."""
         scale = numbers[SCALE][rows, 0]
         place = pose[:, :3]
         if self.anchored:

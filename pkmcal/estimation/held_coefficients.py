@@ -31,7 +31,7 @@ class Held:
 
     @property
     def name(self) -> str:
-        """Of the effect."""
+        """Name of the effect."""
         return self.effect.name
 
     def of_rows(self, measured: Any) -> EffectOfRows:

@@ -1,4 +1,4 @@
-"""Where a machine is at each distinct row of actuators."""
+"""States of a machine at each distinct row of actuators."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray
 
 @dataclass(frozen=True, eq=False)
 class RowStates:
-    """Where the machine is at each distinct row of actuators.
+    """The state of a machine at each distinct row of actuators.
 
     Attributes
     ----------

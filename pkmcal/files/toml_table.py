@@ -39,7 +39,7 @@ class Units:
 
 
 def shown(value: object) -> str:
-    """What was found, short enough for a message."""
+    """Shorten a text for a message."""
     if isinstance(value, bool):
         return str(value).lower()
     text = repr(dict(value) if isinstance(value, Mapping) else value)

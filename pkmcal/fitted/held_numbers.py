@@ -1,4 +1,4 @@
-"""How readings follow numbers that a fit held: their columns beside those of its design."""
+"""Columns, beside the design, of numbers that a fit held."""
 
 from __future__ import annotations
 

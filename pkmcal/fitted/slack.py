@@ -177,7 +177,7 @@ def _longer(equations: Equations, estimate: Estimate) -> tuple[FloatArray, Float
 def slack_cables(
     equations: Equations, estimate: Estimate, cells: Sequence[Cell]
 ) -> tuple[SlackCable, ...]:
-    """What cells are in words and mm, at poses found without them, the longest first."""
+    """List slack cables in words and mm, at poses found without them, the longest first."""
     if not cells:
         return ()
     evaluation = estimate.evaluation
@@ -205,7 +205,7 @@ def listed_slack(cables: Sequence[SlackCable]) -> str:
 
 
 def _pulling(equations: Equations) -> BoolArray:
-    """Which closures are of a cable, (equations,)."""
+    """Mark closures of cables, (equations,)."""
     robot = equations.parameters.robot
     if not isinstance(robot, Robot) or robot.model.chains is not None:
         return np.zeros(equations.machines.equations, dtype=bool)

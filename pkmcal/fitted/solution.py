@@ -273,7 +273,7 @@ class Solution(HeldOut, Generic[Machine]):
 
     @property
     def read(self) -> BoolArray:
-        """Of which fitted rows (N,) more is known than where the actuators were."""
+        """Mask of fitted rows (N,) of which more is known than where the actuators were."""
         read: BoolArray = self.fit.equations.table.count > 0
         return read
 
@@ -284,7 +284,7 @@ class Solution(HeldOut, Generic[Machine]):
 
     @property
     def left_out(self) -> str:
-        """Which rows were left out as asked, in words; "" where none were."""
+        """The rows that were left out as asked, in words; "" where none were."""
         count = len(self.dropped) + len(self.holdout_dropped)
         names = ", ".join(filter(None, (self.dropped_names, self.holdout_dropped_names)))
         many = f"{count} rows were" if count > 1 else "1 row was"

@@ -68,7 +68,7 @@ def joints_of_kind(
 
 
 def _at_home(table: Table, limb: Limb, entries: dict[str, Entry], home: FloatArray) -> _Home:
-    """Where the limb is with the platform at home; refused where it does not get there."""
+    """Return the limb with the platform at home; refuse it where it does not get there."""
     numbers = np.array([entries[slot].value if slot in entries else 0.0 for slot in SLOTS])
     value = dict(zip(SLOTS, numbers, strict=True))
     still = numbers.copy()

@@ -25,7 +25,7 @@ class Term(NamedTuple):
 
 
 class Tie(NamedTuple):
-    """How a limb number follows from its terms.
+    """A tie: a limb number as a function of its terms.
 
     ``"equal"``: one term. ``"cos"`` and ``"sin"``: two terms, a radius and an angle, the number
     being radius·cos(angle) or radius·sin(angle).

@@ -1,4 +1,4 @@
-"""What a machine depends on beside what its actuators read: how these came there, and its load."""
+"""State of drives beside their readings: how the actuators came there, and their load."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ M = TypeVar("M")
 
 
 class DriveState(NamedTuple):
-    """Of each actuator, and of the platform, at N rows; None where nothing is known.
+    """The state of each actuator, and of the platform, at N rows; None where it is unknown.
 
     Attributes
     ----------

@@ -186,7 +186,7 @@ class _Balance(NamedTuple):
 
     @property
     def reached(self) -> BoolArray:
-        """Which poses the machine can take (N,)."""
+        """Mask of poses the machine can take (N,)."""
         return np.asarray(np.isfinite(self.slopes).all(axis=(1, 2)))
 
 

@@ -1,4 +1,4 @@
-"""How well actuators were read."""
+"""Standard deviations of the actuator readings."""
 
 from __future__ import annotations
 

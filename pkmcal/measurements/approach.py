@@ -38,7 +38,7 @@ class Approach(Field):
         return {self.name, *(f"{self.name}.{q}" for q in actuators)}
 
     def read(self, table: Table, instrument: Reading, units: Sequence[str]) -> FloatArray | None:
-        """Whole numbers (rows, n)."""
+        """Read whole numbers (rows, n)."""
         return read_of_actuators(table, self.name, len(units), table.integers)
 
     def columns(self, m: Any, units: Sequence[str]) -> Iterator[WrittenColumn]:

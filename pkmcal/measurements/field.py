@@ -80,7 +80,7 @@ class Field:
         return {self.name}
 
     def read(self, table: Table, instrument: Reading, units: Sequence[str]) -> Any:
-        """What a table states; None where it states nothing. `units` are those of the actuators.
+        """Read the field of a table; None where it states nothing. `units` are the actuators'.
 
         By default its one column: numbers, NaN where a cell is empty, or names.
         """
@@ -104,7 +104,7 @@ class Field:
         return iter(())
 
     def said(self, m: Any) -> str:
-        """What the title of the printed table says of it, or nothing."""
+        """Return the field's words in the title of the printed table, or nothing."""
         return ""
 
 
@@ -149,7 +149,7 @@ def one_or_each(name: str, units: Sequence[str], values: FloatArray) -> Iterator
 def values_array(
     given: ArrayLike | None, instrument: Reading, rows: tuple[int, ...], alone: bool
 ) -> FloatArray:
-    """What was read, (N, k) or (N,); NaN where nothing was, of orientations as a whole."""
+    """Return readings, (N, k) or (N,); NaN where nothing was read, of orientations as a whole."""
     kind, k = instrument.name, len(instrument.components)
     if given is None:
         if k:

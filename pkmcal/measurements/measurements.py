@@ -1,4 +1,4 @@
-"""What was measured on a machine: actuator readings and, beside them, poses, points or lengths."""
+"""Measurements of a machine: actuator readings and, beside them, poses, points or lengths."""
 
 from __future__ import annotations
 
@@ -266,7 +266,7 @@ class Measurements(Result):
         return np.array(np.broadcast_to(place, (len(self), 3)), order="C")
 
     def __getattr__(self, name: str) -> Any:
-        """Of the instrument: `run`, `touched`, `attachment` …; None where it has none."""
+        """Return an attribute of the instrument: `run`, `touched`, …; None where it has none."""
         if name in OF_MEASUREMENTS and "instrument" in vars(self):
             none = () if name == "touch_distances" else None
             return getattr(self.instrument, OF_MEASUREMENTS[name], none)
@@ -274,7 +274,7 @@ class Measurements(Result):
 
     @property
     def pose_index(self) -> Int64Array:
-        """Which pose each row belongs to, (N,), counted from 0.
+        """Pose of each row, (N,), counted from 0.
 
         Rows of one `group` are of one pose, and rows at the same actuators.
         """

@@ -18,7 +18,7 @@ from pkmcal.readings.rows import is_name
 
 
 class Session(Field):
-    """When the rows were measured."""
+    """Session in which the rows were measured."""
 
     logged = True
     unit = None

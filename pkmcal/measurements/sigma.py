@@ -1,4 +1,4 @@
-"""How good readings are: standard deviations or covariances of every row."""
+"""Standard deviations or covariances of the readings of every row."""
 
 from __future__ import annotations
 

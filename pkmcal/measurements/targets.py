@@ -24,10 +24,10 @@ _OF_A_TARGET = re.compile(r"(?P<target>.+)\.[xyz]")
 
 
 class TargetIndex(Field):
-    """Which of several targets each row measured, counted from 0; its columns say where it is."""
+    """Which target each row measured, of several, counted from 0; its columns say its place."""
 
     def kept(self, given: Any, m: Any) -> Int64Array:
-        """Whole numbers (N,)."""
+        """Check whole numbers (N,)."""
         _refuse_without_point(m.instrument)
         index = integers(self.name, given, len(m))
         if index.min() < 0:

@@ -26,7 +26,7 @@ class Temperature(Field):
     log_first = True
 
     def kept(self, given: Any, m: Any) -> FloatArray:
-        """Of all, of each row or of each part; NaN where it was not read."""
+        """Check temperatures of all, of each row or of each part; NaN where none was read."""
         found = numbers("temperature", given, blank=True)
         rows, parts = len(m), m.actuators.shape[1] + 2
         if found.shape not in ((), (rows,), (rows, parts)):

@@ -24,7 +24,7 @@ class Tension(Field):
     blank = True
 
     def kept(self, given: Any, m: Any) -> FloatArray:
-        """Of each actuator, given for all, for each or for each row."""
+        """Check tensions of each actuator, given for all, for each or for each row."""
         return of_actuators(self.name, given, m.actuators.shape, self.blank)
 
     def names(self, actuators: Collection[str], components: Collection[str]) -> set[str]:
@@ -46,7 +46,7 @@ class Tension(Field):
             yield from numbered(self.name, "N", self.of(m))
 
     def said(self, m: Any) -> str:
-        """Whether it is exact."""
+        """Say whether tensions are exact."""
         if m.tension is None:
             return ""
         return "tension stated" if m.tension_sigma is None else "tension read"

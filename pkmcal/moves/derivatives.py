@@ -58,7 +58,7 @@ def straight(
 
 
 def written(pose: FloatArray, speed: FloatArray, bend: FloatArray) -> FloatArray:
-    """Of x y z α β γ (N, 6) that have speeds and accelerations; regular at β = ±90° too.
+    """Return x y z α β γ (N, 6) with speeds and accelerations; regular at β = ±90° too.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Where speeds jump along a move: at the nodes of tables in drive laws."""
+"""Jumps of speed along a move: at the nodes of tables in drive laws."""
 
 from __future__ import annotations
 

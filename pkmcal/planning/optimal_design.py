@@ -146,7 +146,7 @@ class Design:
         return min(found, key=len)
 
     def exchanged_for(self, chosen: IntArray, member: int) -> FloatArray:
-        """What the criterion is with each candidate (N,) in place of a member.
+        """Return the criterion with each candidate (N,) in place of a member.
 
         Logarithm of a standard deviation, of the prediction or of the scaled parameters; infinite
         for the other members and for candidates of another sort.
@@ -167,7 +167,7 @@ class Design:
         return worth
 
     def _lacking(self, chosen: list[int]) -> FloatArray:
-        """What stands for the information that a choice lacks.
+        """Return a stand-in for the information that a choice lacks.
 
         Choices too small to identify everything differ in what they identify only if the rest is
         not unknown beyond all measure.
@@ -216,7 +216,7 @@ class Design:
         return np.sort(np.array(chosen, dtype=np.intp))
 
     def _settled(self, chosen: list[int], ridge: FloatArray) -> list[int]:
-        """The same of candidates on a shortlist."""
+        """Settle the gains of candidates on a shortlist."""
         short, exchanged = self._shortlist(chosen, ridge), True
         while exchanged:
             chosen, exchanged = self._exchange(chosen, ridge, short)
@@ -269,7 +269,7 @@ class Design:
         return information
 
     def _gains(self, chosen: list[int], ridge: FloatArray, among: IntArray) -> FloatArray:
-        """What each candidate among these would add to the chosen; nothing for themselves."""
+        """Return the gain of each of these candidates beside the chosen; 0 for the chosen."""
         at = np.sort(np.array(chosen, dtype=np.intp))
         every = len(among) == len(self._blocks)
         gains = self._changes(self._blocks if every else self._blocks[among], at, 1.0, ridge)
@@ -304,7 +304,7 @@ class Design:
         return gains
 
     def _bounds(self, chosen: IntArray, ridge: FloatArray) -> FloatArray:
-        """What the gain of no candidate (N,) exceeds.
+        """Bound the gain of every candidate (N,).
 
         With G = B C Bᵀ of a block, ln det(1 + G) ≤ k ln(1 + tr G / k), and what it takes off the
         cost, tr((1 + G)⁻¹ S), is at most tr S. Single precision is allowed for.

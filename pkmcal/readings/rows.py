@@ -45,7 +45,7 @@ def signs(name: str, given: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
 
 
 def is_name(text: str) -> bool:
-    """Whether a name can be written and read: on one line, not empty, not too long."""
+    """Return whether a name can be written and read: on one line, not empty, not too long."""
     return 0 < len(text) <= LONGEST_NAME and text == " ".join(text.split())
 
 

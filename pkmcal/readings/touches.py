@@ -91,7 +91,7 @@ class Touch(Reading):
         place: FloatArray = NOWHERE,
         **numbers: FloatArray,
     ) -> Predicted:
-        """How far `target` (N, 3) is off the artefact, in its axes, mm.
+        """Return how far `target` (N, 3) is off the artefact, in its axes, mm.
 
         A sphere has its centre `anchor` (N, 3) and radius `zero` (N, 1), any other artefact a pose
         `place` (N, 6).
@@ -152,7 +152,7 @@ class Touch(Reading):
         return self.with_fields({"touched": named, "distances": known}), values
 
     def title(self, m: Measured) -> str:
-        """How many touches of how many artefacts."""
+        """Return a title that counts touches and artefacts."""
         count = len(np.unique(self._names))
         return f"{super().title(m)} of {count} {self.artefact}{'' if count == 1 else 's'}"
 
@@ -167,7 +167,7 @@ class Touch(Reading):
         return named | (off & table.columns.keys())
 
     def read(self, table: Table, units: Sequence[str]) -> Touch:
-        """What is touched, and known distances."""
+        """Read the touched artefacts, and known distances."""
         name = self.found_in(table)[0]
         artefact = name.partition(":")[2] or "point"
         if artefact not in TOUCHES:
@@ -188,7 +188,7 @@ class Touch(Reading):
             yield from super().value_columns(values)
 
     def columns(self, units: Sequence[str]) -> Iterator[WrittenColumn]:
-        """What each row touches."""
+        """Write what each row touches."""
         of = "" if self.artefact == "point" else f":{self.artefact}"
         yield WrittenColumn(f"touch{of}", "", self._names)
 

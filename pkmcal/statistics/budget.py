@@ -59,7 +59,7 @@ class Contribution:
 
 @dataclass(frozen=True)
 class Budget:
-    """What a result is uncertain by.
+    """Budget of uncertainty of a result.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""How far the sliders of a page go, where a machine's positions are, and its assembly modes."""
+"""Ranges of a page's sliders, places of a machine, and its assembly modes."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def sliders(
 
 
 def farthest(robot: Robot, strokes: list[tuple[float, float] | None]) -> float:
-    """How far sliders lead from home, mm: where no stroke ends that, to the farthest base joint."""
+    """Return the largest way from home, mm: where no stroke ends it, to the farthest base joint."""
     units = robot.actuator_units
     if all(stroke or unit == "rad" for stroke, unit in zip(strokes, units, strict=True)):
         return np.inf

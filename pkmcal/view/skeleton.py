@@ -37,7 +37,7 @@ class Skeleton:
 
 
 def skeleton(robot: Robot | SerialArm, q: FloatArray, guess: FloatArray) -> Skeleton | None:
-    """Where a machine's joints are at actuator coordinates (n,); None where it has no pose.
+    """Return a machine's joints at actuator coordinates (n,); None where it has no pose.
 
     Parameters
     ----------
