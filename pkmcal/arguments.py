@@ -102,7 +102,7 @@ def whole(name: str, value: object, least: int, most: float = math.inf, note: st
 
 
 def word(name: str, value: object, known: Collection[W]) -> W:
-    """One of the known words.
+    """Check that an argument is one of the known words.
 
     Raises
     ------

@@ -45,7 +45,7 @@ def fixed(value: float, places: int) -> str:
 
 
 def rounded(value: float, places: int) -> str:
-    """As `fixed`; a value that tens or hundreds would make 0 has two significant digits.
+    """Print as `fixed`, but a value that rounds to 0 in tens has two significant digits.
 
     Examples
     --------

@@ -6,7 +6,7 @@ from pkmcal.display import visible
 
 
 class _Shown(Exception):
-    """Its message steers no terminal, whatever names from files it quotes."""
+    """An error or warning whose message steers no terminal, whatever it quotes."""
 
     def __str__(self) -> str:
         return visible(super().__str__())

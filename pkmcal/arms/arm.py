@@ -229,7 +229,7 @@ class SerialArm(SerialChain, Result):
 
     @property
     def joint_laws(self) -> JointLaws:
-        """Its laws; without numbers where it has none."""
+        """Return the laws of the joints; without numbers where there are none."""
         return self.laws or JointLaws(JointPulls(self.axes, self.points, self.kinds))
 
     def approaching(self, approach: ArrayLike) -> SerialArm:

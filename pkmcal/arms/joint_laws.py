@@ -53,7 +53,7 @@ class Term(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Its name among the numbers of the arm."""
+        """Name of the term among the numbers of the arm."""
         own = self.joint + 1
         match self.kind:
             case "sag":
@@ -153,7 +153,7 @@ class JointLaws:
 
     @cached_property
     def terms(self) -> tuple[Term, ...]:
-        """Its numbers, joint by joint."""
+        """Terms of the laws, joint by joint."""
         return tuple(sorted(self.numbers, key=lambda t: (t.joint, KINDS.index(t.kind), t.of)))
 
     @property
@@ -163,7 +163,7 @@ class JointLaws:
 
     @property
     def units(self) -> tuple[Unit, ...]:
-        """Their units."""
+        """Units of the terms."""
         return tuple(self._unit(term) for term in self.terms)
 
     def _unit(self, term: Term) -> Unit:
@@ -180,7 +180,7 @@ class JointLaws:
 
     @cached_property
     def values(self) -> FloatArray:
-        """Its numbers (k,)."""
+        """Values of the terms (k,)."""
         return np.array([self.numbers[term] for term in self.terms])
 
     def with_values(self, values: FloatArray) -> JointLaws:
@@ -188,24 +188,24 @@ class JointLaws:
         return replace(self, numbers=dict(zip(self.terms, values.tolist(), strict=True)))
 
     def with_terms(self, terms: Iterable[Term]) -> JointLaws:
-        """With these numbers beside its own, 0 where they are new."""
+        """Return the laws with more terms, 0 where they are new."""
         numbers = dict.fromkeys(terms, 0.0) | dict(self.numbers)
         return replace(self, numbers=numbers, memo=Memo())
 
     def approaching(self, approach: FloatArray) -> JointLaws:
-        """With joints that come from there, (n,) or (N, n)."""
+        """Return the laws for joints that come from these coordinates, (n,) or (N, n)."""
         return replace(self, approach=approach)
 
     def under(self, carried: AtTool | None) -> JointLaws:
-        """With what the tool carries, which compliances follow."""
+        """Return the laws under a load at the tool, which compliances follow."""
         return replace(self, pulls=self.pulls.under(carried))
 
     def weighing(self, masses: FloatArray, centres: FloatArray) -> JointLaws:
-        """With masses (n,) and centres (n, 3) of the links."""
+        """Return the laws with masses (n,) and centres (n, 3) of the links."""
         return replace(self, pulls=replace(self.pulls, masses=masses, centres=centres), memo=Memo())
 
     def of_rows(self, rows: IntArray) -> JointLaws:
-        """With the state that it has in some rows of a call; itself where that is the same."""
+        """Return the laws with their state in some rows of a call."""
         approach, pulls = self.approach, self.pulls.of_rows(rows)
         if approach is not None and approach.ndim == 2:
             approach = approach[rows]

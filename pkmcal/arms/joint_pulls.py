@@ -68,7 +68,7 @@ class AtTool(NamedTuple):
     moment: FloatArray
 
     def of_rows(self, rows: IntArray) -> AtTool:
-        """That of some rows of a call."""
+        """Return the load in some rows of a call."""
         weight, centre, tool, force, moment = self
         if weight.ndim == 1:
             return self
@@ -126,11 +126,11 @@ class JointPulls:
         return self.masses is not None and self.centres is not None
 
     def under(self, carried: AtTool | None) -> JointPulls:
-        """With another load at the tool."""
+        """Return the loads with another load at the tool."""
         return replace(self, carried=carried)
 
     def of_rows(self, rows: IntArray) -> JointPulls:
-        """With the load of some rows of a call."""
+        """Return the loads in some rows of a call."""
         carried = None if self.carried is None else self.carried.of_rows(rows)
         return self if carried is self.carried else self.under(carried)
 
@@ -196,7 +196,7 @@ class JointPulls:
 
     @cached_property
     def _ways(self) -> FloatArray:
-        """From each joint's point to the next one's, 0 behind the last, (n, 3)."""
+        """Return the way from each joint's point to the next, 0 behind the last, (n, 3)."""
         found = np.zeros_like(self.points)
         found[:-1] = self.points[1:] - self.points[:-1]
         return found

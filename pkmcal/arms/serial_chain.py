@@ -153,7 +153,7 @@ class SerialChain:
 
     @property
     def arguments(self) -> ArmArguments:
-        """Its arguments: ``SerialArm(**arm.arguments)`` is the same arm."""
+        """Arguments of the arm: ``SerialArm(**arm.arguments)`` equals it."""
         return {
             "axes": self.axes,
             "points": self.points,

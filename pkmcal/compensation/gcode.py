@@ -127,7 +127,7 @@ class Program:
         return FileError(f"{self._place}, line {line + 1}: {message}")
 
     def read(self) -> Iterator[tuple[str, Move | None]]:
-        """Its lines with their ends, each with its move.
+        """Read the program's lines with their ends, each with its move.
 
         Raises
         ------

@@ -99,7 +99,7 @@ class Pieces:
 
 
 def _lines_of(lines: _Lines, at: int, moves: int) -> int:
-    """Behind which line so many moves are complete."""
+    """Return the line behind which so many moves are complete."""
     while moves:
         moves -= lines[at][1] is not None
         at += 1

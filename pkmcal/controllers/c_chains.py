@@ -87,7 +87,7 @@ def contents(robot: Robot, prefix: str, number: Number) -> tuple[dict[str, Any],
 
 
 def _links(layout: ChainLayout, numbers: FloatArray) -> tuple[list[FloatArray], list[FloatArray]]:
-    """From each joint of a chain to the next and to its end, and the ball on the platform.
+    """Return motions from each joint of a chain to the next, to its end, and to the ball.
 
     As ``prepare_chains`` of csrc/chain_system.h has them.
     """

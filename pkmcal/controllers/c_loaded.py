@@ -34,7 +34,7 @@ def holds(robot: Robot) -> bool:
 
 
 def not_held(robot: Robot) -> Loss | None:
-    """By how much a header is off that holds no sag; None where it holds all, or nothing sags."""
+    """Return the error of a header without sag; None where it holds all, or nothing sags."""
     return None if robot.model.elastic is None or holds(robot) else sag(robot)
 
 

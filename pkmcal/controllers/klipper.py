@@ -111,7 +111,7 @@ def _rotary(robot: Robot, project: bool) -> tuple[Values, tuple[float, ...], Los
 
 
 def _as_in_the_file(values: Values, printer: PrinterConfig, angles: Mapping[str, float]) -> Values:
-    """Without what the firmware takes from elsewhere, and with angles in the file's turn."""
+    """Drop what the firmware takes from elsewhere; give angles in the file's turn."""
     kept = {}
     for (section, option), value in values.items():
         default = angles.get(section) if option == "angle" else None

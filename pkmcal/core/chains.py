@@ -113,7 +113,7 @@ class ChainLayout:
 
     @property
     def steps(self) -> FloatArray:
-        """By how much each number changes where effects are found by differences, mm and rad."""
+        """Return steps of each number for differences, mm and rad."""
         found = np.full(self.numbers, _STEP)
         for place in (self.place, self.end_place, self.ball_place[self.ball != 0]):
             found[np.unique(place)[:, None] + np.arange(3)] *= self.length

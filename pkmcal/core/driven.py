@@ -371,7 +371,7 @@ class DrivenMachine(CoreMachine):
         return by_step, by_number
 
     def by_tension(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
-        """By how much less limbs read at poses (N, 6) per N of their tension, (N, drives)."""
+        """Return how much less limbs read at poses (N, 6) per N of tension, (N, drives)."""
         way, state = self._of_limbs.inverse(self._bare(slots), pose), self._state(len(pose))
         slope = self.laws.ways(slots, self.laws.readings(slots, way, *state), *state).slope
         return -self.laws.by_tension(slots, way, state[1]) / slope

@@ -378,7 +378,7 @@ class Laws:
     # ----------------------------------------------------------------------------------------------
 
     def _alone(self, d: int) -> Laws:
-        """One drive, as if it were all."""
+        """Return the laws of one drive alone."""
         if d not in self._of_one:
             self._of_one[d] = Laws([replace(self.drives[d], actuator=0)], self._size)
         return self._of_one[d]

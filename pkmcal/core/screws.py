@@ -34,7 +34,7 @@ def pose(motion: FloatArray, isa: int | None = None) -> FloatArray:
 
 
 def exp_jacobian(twist: FloatArray, inverse: bool, isa: int | None = None) -> FloatArray:
-    """At twists (N, 6): how the motion follows the twist, or inversely, (N, 36)."""
+    """Differentiate motions by twists (N, 6), or inversely, (N, 36)."""
     name = "log_jacobian" if inverse else "exp_jacobian"
     return rows(name, twist, isa=isa)[0].reshape(-1, 36)
 

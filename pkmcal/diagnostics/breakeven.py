@@ -77,7 +77,7 @@ def breakeven(fit: Fit) -> tuple[Breakeven, ...]:
 
 
 def in_words(found: tuple[Breakeven, ...]) -> str:
-    """One sentence on all of them; "" without any."""
+    """Return one sentence on these errors; "" without any."""
     if not found:
         return ""
     return (

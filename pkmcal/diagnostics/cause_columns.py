@@ -28,7 +28,7 @@ _LEAST_WAY = 1e-9  # of the machine's length, below which actuators have not mov
 
 
 class Cause(NamedTuple):
-    """One cause.
+    """A cause that is not in the model.
 
     Attributes
     ----------

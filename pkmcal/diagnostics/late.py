@@ -24,7 +24,7 @@ CHANCE = 1e-3  # below which readings are late
 
 @dataclass(frozen=True)
 class Late:
-    """By how much readings are late, or after the machine left.
+    """The lag of readings: before the machine arrived, or after it left.
 
     Attributes
     ----------

@@ -83,7 +83,7 @@ def _distant_text(found: Solution, point: DistantPoint) -> str:
 
 
 def _shrunk(found: Solution) -> tuple[float, ...]:
-    """By which share poses lie closer together, where touches alone say how large the machine is.
+    """Return the share by which poses moved closer, where touches alone state the size.
 
     Touches of a point, a line or a plane do not: a smaller machine makes all their misfits smaller.
     """

@@ -127,7 +127,7 @@ def _stated(found: Solution) -> bool:
 
 
 def _widened(found: Solution) -> tuple[float, ...]:
-    """By how much ± are wider than sigma alone would make them, where that is worth a word."""
+    """Return the factor by which ± exceed those of sigma alone, where that is worth a word."""
     scale = found.fit.uncertainty.covariance.scale
     least = {"classical": 1.0, "cluster": _LARGE}[found.covariance_rule]
     return at_most_one(scale if _stated(found) and scale > least else None)

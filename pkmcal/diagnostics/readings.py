@@ -59,7 +59,7 @@ def hardly_turned(found: Solution) -> HardlyTurned | None:
 
 
 def _spread(angles: FloatArray) -> FloatArray:
-    """By how much orientations (N, 3) differ about three axes, rms, the largest first."""
+    """Return the rms spread of orientations (N, 3) about three axes, the largest first."""
     off = orientation.between(angles, np.repeat(angles[:1], len(angles), axis=0))
     size: FloatArray = np.linalg.svd(off - off.mean(axis=0), compute_uv=False)
     spread: FloatArray = size / np.sqrt(len(angles))

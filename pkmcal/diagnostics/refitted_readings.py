@@ -115,7 +115,7 @@ class _Compared:
         return likelihood
 
     def _likelihood(self, left: FloatArray) -> tuple[float, FloatArray]:
-        """Its logarithm, up to a constant, and the deviation (m,) of each equation's group."""
+        """Return the log-likelihood up to a constant, and each equation's group deviation (m,)."""
         count = np.bincount(self.group)
         variance = np.maximum(np.bincount(self.group, left**2) / count, 1e-300)
         return float(-0.5 * (count * np.log(variance)).sum()), np.sqrt(variance)[self.group]

@@ -90,7 +90,7 @@ def _read_as(
 
 
 def _shrunk(given: Measurements, other: Measurements) -> float:
-    """By how much smaller measured numbers become, at most 1."""
+    """Return the factor by which measured numbers shrink, at most 1."""
     turning = given.instrument.turning  # orientations do not become small
     columns = slice(None) if turning is None else slice(0, turning)
     before, after = (

@@ -65,7 +65,7 @@ class Effect(Protocol):
         """The effect in these rows; an error where what it needs was not read."""
 
     def dependences(self, measured: Any) -> Iterator[Dependence]:
-        """Its coefficients: arguments whose names no reading and no other effect has."""
+        """Return the effect's coefficients; no reading and no other effect has their names."""
 
 
 class Changed(NamedTuple):

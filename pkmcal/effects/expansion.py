@@ -110,7 +110,7 @@ class MachineExpansion:
     name: ClassVar[str] = "expansion"
 
     def dependences(self, measured: Measurements) -> Iterator[Dependence]:
-        """None: its coefficients are exact."""
+        """Return no coefficients: those of expansion are exact."""
         return iter(())
 
     def of_rows(self, measured: Measurements) -> Growth:

@@ -54,7 +54,7 @@ class Harmonics:
 
     @property
     def option(self) -> str:
-        """As ``--effects`` has it."""
+        """The effect as a word of ``--effects``."""
         of = "" if self.joints == "all" else f"@{':'.join(map(str, _several(self.joints)))}"
         return f"harmonics={':'.join(f'{k:g}' for k in self._waves())}{of}"
 

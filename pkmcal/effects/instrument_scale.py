@@ -25,12 +25,12 @@ _TYPICAL = 1e-3  # of a length: what moves a reading as much as 1 mm does at a d
 
 @dataclass(frozen=True)
 class InstrumentScale:
-    """By how much an instrument reads lengths too long, found with the geometry as ``scale``."""
+    """The scale error of an instrument for lengths, found with the geometry as ``scale``."""
 
     name: ClassVar[str] = SCALE
 
     def dependences(self, measured: Measurements) -> Iterator[Dependence]:
-        """One number, common to all rows."""
+        """Return the scale, one number common to all rows."""
         count = len(measured)
         number = Numbers(
             (SCALE,), ("1",), np.zeros(1, dtype=np.intp), np.zeros(1), np.array([_TYPICAL])

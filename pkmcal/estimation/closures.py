@@ -283,7 +283,7 @@ class FreePoses:
     def _rows_by_numbers(
         self, robot: Calibratable, states: RowStates, places: IntArray
     ) -> FloatArray:
-        """Their derivative by numbers of the geometry, (K, rows, p)."""
+        """Differentiate the rows by numbers of the geometry, (K, rows, p)."""
         return pose_steps.readings_by_numbers(machine_of(robot), states.pose, self.read, places)
 
     def _stepped(self, robot: Calibratable, states: RowStates, step: FloatArray) -> RowStates:

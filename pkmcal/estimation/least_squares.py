@@ -145,7 +145,7 @@ class Search:
         return found
 
     def own_jacobian(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
-        """As `jacobian`, for a caller who changes it: it is not kept."""
+        """Return `jacobian` in memory of its own, which the caller may change."""
         found = np.empty((self._equations, len(self.scale)))
         for _, some, by_u in self._batches(evaluation, noise):
             if len(by_u) == len(found):

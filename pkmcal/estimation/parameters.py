@@ -286,7 +286,7 @@ class Parameters:
         return values
 
     def by_name(self, theta: FloatArray) -> dict[str, float]:
-        """All numbers at `theta` (n,) by name: of the geometry, and beside it.
+        """Return all numbers at `theta` (n,) by name: the geometry's and the others.
 
         What each session has for itself is there by its name with the session alone.
         """

@@ -99,7 +99,7 @@ class PoseSystem:
         residual: FloatArray,
         leverage: FloatArray,
     ) -> Shares:
-        """As `Equations.by_groups`."""
+        """Forward to `Equations.by_groups`."""
         (_, by_unknown, _), group = self.at(evaluation, noise), self.blocks.group_of_equation
         return self.blocks.elimination.by_groups(by_unknown, group, weights, residual, leverage)
 

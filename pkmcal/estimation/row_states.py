@@ -31,13 +31,13 @@ class RowStates:
     tension: FloatArray | None = None
 
     def at_poses(self, rows: IntArray, poses: FloatArray) -> RowStates:
-        """These with some rows at poses (s, 6)."""
+        """Return the states with some rows at poses (s, 6)."""
         pose = self.pose.copy()
         pose[rows] = poses
         return replace(self, pose=pose)
 
     def chosen(self, rows: BoolArray, others: RowStates) -> RowStates:
-        """These where `rows` (K,), else the others."""
+        """Choose these states where `rows` (K,), else the others."""
         if rows.all():
             return self
         actuators = self.actuators

@@ -140,7 +140,7 @@ class Machines:
         return whole, _joined(by_unknown, self.rows)
 
     def shifted(self, by: FloatArray) -> Machines:
-        """With closures of other readings: whitened equations (K, equations) are larger."""
+        """Return the machines with other actuator readings, by whitened shifts (K, equations)."""
         return replace(self, shift=by if self.shift is None else self.shift + by)
 
     def lengths(self) -> FloatArray:
@@ -197,7 +197,7 @@ class Machines:
         )
 
     def with_exact_actuators(self, read: FloatArray) -> Machines:
-        """With poses that follow from what the actuators read (K, n)."""
+        """Return the machines with poses that follow exactly from the actuators (K, n)."""
         exact = tuple(ExactActuators(each) for each in _apart(read, self.rows))
         return replace(self, closures=exact, shift=None)
 

@@ -45,7 +45,7 @@ class Cells(NamedTuple):
     sigma: FloatArray | None
 
     def of(self, rows: IntArray) -> Cells:
-        """Those of some rows."""
+        """Return the cells of some rows."""
         return Cells(self.read[rows], None if self.sigma is None else self.sigma[rows])
 
 

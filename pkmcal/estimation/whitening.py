@@ -74,7 +74,7 @@ class Whitening:
         return self.whiten([np.array(part) for part in parts], noise)
 
     def whiten(self, parts: Sequence[FloatArray], noise: FloatArray) -> FloatArray:
-        """As `whitened`, in the memory of the parts: a Jacobian is large."""
+        """Whiten in place, as `whitened` does in new memory: a Jacobian is large."""
         for i, part in enumerate(parts):
             for rows in lots(len(part), _TOGETHER):
                 self._whiten(part[rows], i, rows, noise)

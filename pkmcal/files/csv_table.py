@@ -42,7 +42,7 @@ _SHOWN = 8  # names of columns in a message
 
 @dataclass(frozen=True)
 class Column:
-    """One column.
+    """A column of a table.
 
     Attributes
     ----------

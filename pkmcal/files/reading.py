@@ -90,7 +90,7 @@ def content(path: str | PathLike[str], most: int) -> bytes:
 
 
 def _read(path: Path, most: int) -> bytes:
-    """All of a file; of one without end no more than the limit."""
+    """Read a file whole; of one without end no more than the limit."""
     if not path.exists():
         near = (each.name for each in path.parent.glob(f"*{path.suffix}"))
         raise MissingFileError(

@@ -93,7 +93,7 @@ class Fit:
 
     @cached_property
     def end(self) -> Evaluation:
-        """These equations at the solution."""
+        """The equations at the solution."""
         solution = self.estimate.evaluation
         if self.equations is self.estimator.equations:
             return solution

@@ -43,7 +43,7 @@ class HeldNumbers:
     spread: FloatArray
 
     def matrix(self) -> FloatArray:
-        """All columns, (M, k)."""
+        """Return the columns, (M, k)."""
         return np.concatenate([some for _, some in self.columns()])
 
 

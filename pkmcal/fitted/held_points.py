@@ -276,7 +276,7 @@ def _each_unit(points: Points) -> Iterator[tuple[str, BoolArray]]:
 def families(
     points: Points, named: Labels, good: BoolArray, odd: BoolArray, uncertainty: Uncertainty
 ) -> Iterator[HeldFamily]:
-    """Each family of the rows that were reached (M,); `odd` (M,) are equations of rows that are."""
+    """Return families of equations (M,) that were reached; `odd` (M,) are of outlying rows."""
     by_fit = points.by_fit(uncertainty)
 
     def rms(squares: FloatArray, of: BoolArray) -> float:

@@ -66,7 +66,7 @@ class Later:
         return columns
 
     def equations(self, fitted: Equations) -> Equations:
-        """Their equations, weighted as those of the fit."""
+        """The equations of the later rows, weighted as those of the fit."""
         deviations = [
             np.ones(len(data.measured.components))
             if differs(fitted, data, i)

@@ -319,5 +319,5 @@ class Solution(HeldOut, Generic[Machine]):
         return self.chi2_per_dof
 
     def to_dict(self) -> dict[str, Any]:
-        """All attributes by name, as JSON files hold them."""
+        """Return all attributes by name, as JSON files hold them."""
         return {name: getattr(self, name) for name in _NAMES}

@@ -54,7 +54,7 @@ class CableLoad:
 
     @property
     def numbers(self) -> dict[str, float]:
-        """Their values, N and mm."""
+        """Values of the load's numbers, N and mm."""
         values = (*self.force, *self.at, *self.cells)
         return dict(zip(self.units, values, strict=False))
 

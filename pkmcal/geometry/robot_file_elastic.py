@@ -206,7 +206,7 @@ class _Numbers:
     def read(
         self, table: Table, key: str, unit: Unit, name: str, default: float | None = None
     ) -> None:
-        """One number, which is not negative unless it has the unit of a place."""
+        """Read a number, not negative unless it has the unit of a place."""
         value = table[key] if default is None else table.data.get(key, default)
         self._put(table, key, unit, name, value)
         if unit in ("kg", "N/mm") and self.entries[name].value < 0.0:

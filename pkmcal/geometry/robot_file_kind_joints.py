@@ -107,7 +107,7 @@ def _at_home(table: Table, limb: Limb, entries: dict[str, Entry], home: FloatArr
 
 
 def _check_plane(table: Table, limb: Limb, at: _Home) -> None:
-    """In the plane limbs move in it: chains know nothing beside it."""
+    """Check that limbs of a plane machine move in it: chains know nothing beside it."""
     driver = KINDS[limb.kind].driver
     if driver == "crank":
         out = float(np.linalg.norm(at.axes["base"][:2]))

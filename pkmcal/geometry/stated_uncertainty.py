@@ -62,7 +62,7 @@ class StatedUncertainty:
         return tuple(dict.fromkeys([*self.own, *self.common, *self.consider]))
 
     def with_later(self, other: StatedUncertainty) -> StatedUncertainty:
-        """These entries, and behind them those of another statement."""
+        """Append the entries of another statement."""
         return StatedUncertainty(
             _behind(self.own, other.own),
             _behind(self.common, other.common),

@@ -198,7 +198,7 @@ def _unknown(job: Calibration, measured: Sequence[Measurements]) -> dict[Role, K
 
 
 def _known(option: str, text: str, measured: Sequence[Measurements]) -> Known | list[Known]:
-    """One word for all files, or one for each."""
+    """Return words, one for all files or one for each."""
     words = [word(option, part.strip(), KNOWN) for part in text.split(",")]
     if len(words) not in (1, len(measured)):
         raise ArgumentError(f"{option} {text}: {len(words)} words for {len(measured)} files")

@@ -144,7 +144,7 @@ def kinds_of(job: Planning) -> Kind | dict[Kind, int]:
 
 
 def _kinds(text: str) -> Kind | dict[Kind, int]:
-    """One kind, or how many poses of each of several."""
+    """Return one kind, or the number of poses of each of several."""
     if "=" not in text:
         return word("--kind", text, PLANNED)
     found: dict[Kind, int] = {}

@@ -57,11 +57,11 @@ class NamedNumbers(Protocol):
 
     @property
     def units(self) -> Sequence[str]:
-        """Their units: "mm", "rad" or "1"."""
+        """Units of the numbers: "mm", "rad" or "1"."""
 
     @property
     def values(self) -> FloatArray:
-        """Their values (p,)."""
+        """Values of the numbers (p,)."""
 
     def match(self, patterns: str | Iterable[str], argument: str = "") -> list[str]:
         """Names that names and wildcards choose."""
@@ -84,11 +84,11 @@ class Calibratable(Protocol):
 
     @property
     def name(self) -> str:
-        """Its name."""
+        """Name of the machine."""
 
     @property
     def length(self) -> float:
-        """Its characteristic length, mm: an angle counts as its arc there."""
+        """Characteristic length of the machine, mm: an angle counts as its arc there."""
 
     @property
     def n_actuators(self) -> int:
@@ -178,7 +178,7 @@ class ArmMachine:
         return self.arm.laws is not None and self.arm.laws.yielding
 
     def replace(self, changes: FloatArray) -> ArmMachine:
-        """With other joint errors (6 n,) and numbers of its joints' laws, mm and rad."""
+        """Return the arm with other joint errors (6 n,) and numbers of joint laws, mm and rad."""
         of_joints = 6 * self.n_actuators
         arm = self.arm.replace(changes[:of_joints].reshape(-1, 6))
         if arm.laws is not None:
@@ -186,11 +186,11 @@ class ArmMachine:
         return ArmMachine(arm)
 
     def approaching(self, approach: FloatArray) -> ArmMachine:
-        """With joints that come from there (N, n)."""
+        """Return the arm for joints that come from these coordinates (N, n)."""
         return ArmMachine(self.arm.approaching(approach))
 
     def under(self, load: Load) -> ArmMachine:
-        """With what the tool carries, one for all rows or one each."""
+        """Return the arm under a load at the tool, one for all rows or one each."""
         return ArmMachine(self.arm.under(load))
 
     def with_values(self, values: FloatArray) -> ArmMachine:

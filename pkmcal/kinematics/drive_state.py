@@ -33,7 +33,7 @@ class DriveState(NamedTuple):
     load: FloatArray | None = None
 
     def at(self, rows: IntArray | np.intp) -> DriveState:
-        """That of some rows, or of one."""
+        """Return the state of some rows, or of one."""
         return DriveState(*(None if each is None else each[rows] for each in self))
 
     def of(self, machine: M) -> M:

@@ -42,7 +42,7 @@ def along(axis: str) -> CableLoad:
 
 
 def pulled(robot: Robot, poses: FloatArray) -> BoolArray:
-    """At which poses (N, 6) no cable would have to push; at all where no load is known."""
+    """Mark poses (N, 6) where no cable would have to push; all where no load is known."""
     load = load_of(robot)
     everywhere = np.ones(len(poses), dtype=bool)
     return everywhere if load is None else can_pull(robot, poses, load)

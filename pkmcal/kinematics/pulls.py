@@ -56,7 +56,7 @@ class Pulls:
     def summed(
         self, numbers: FloatArray, carried: FloatArray | None, slots: FloatArray
     ) -> FloatArray:
-        """All weights and the force at the tool, as numbers of the platform, (16,) or (N, 16).
+        """Sum weights and tool force as numbers of the platform, (16,) or (N, 16).
 
         Σ m r [kg mm], Σ m [kg], gravity [N/kg], the tool [mm], the force there [N], a moment
         [N mm]: points in the platform's own axes, the rest in the machine's. `numbers` are those

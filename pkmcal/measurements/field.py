@@ -91,16 +91,16 @@ class Field:
         return table.numbers(self.name, self.unit or "1", blank=True)[0]
 
     def columns(self, m: Any, units: Sequence[str]) -> Iterator[WrittenColumn]:
-        """Its columns in a file; by default one of the entries (N,), none where it is None."""
+        """Write the field's columns; by default one of the entries (N,), none where it is None."""
         if self.of(m) is not None:
             yield WrittenColumn(self.name, self.unit or "", self.of(m))
 
     def framed(self, m: Any) -> Iterator[WrittenColumn]:
-        """Its columns in a data frame."""
+        """Return the field's columns in a data frame."""
         return self.columns(m, m.actuator_units or ("mm",) * m.actuators.shape[1])
 
     def printed(self, m: Any) -> Iterator[WrittenColumn]:
-        """Its columns in the printed table."""
+        """Return the field's columns in the printed table."""
         return iter(())
 
     def said(self, m: Any) -> str:
@@ -184,7 +184,7 @@ def values_array(
 
 
 def units_of_actuators(given: str | Sequence[str] | None, count: int) -> tuple[str, ...] | None:
-    """One unit per actuator, "mm" or "rad"; None where none is given."""
+    """Return a unit per actuator, "mm" or "rad"; None where none is given."""
     if given is None:
         return None
     units = words("actuator_units", given)

@@ -282,7 +282,7 @@ class Measurements(Result):
 
     @property
     def drive_state(self) -> DriveState:
-        """From where actuators came, tensions as far as they were read, and what was carried."""
+        """Return actuators' approaches, tensions as far as they were read, and the load."""
         tension = None if self.tension is None else filled_tension(self.tension)
         return DriveState(self.approach, tension, self.load)
 

@@ -26,7 +26,7 @@ class Group(Field):
         return table.integers(self.name) if self.name in table.columns else None
 
     def printed(self, m: Any) -> Iterator[WrittenColumn]:
-        """Its column."""
+        """Return the column of the printed table."""
         return self.framed(m)
 
 
@@ -38,7 +38,7 @@ class Lines(Field):
         return integers(self.name, given, len(m))
 
     def names(self, actuators: Collection[str], components: Collection[str]) -> set[str]:
-        """None."""
+        """Return no names: the column is read elsewhere."""
         return set()
 
     def read(self, table: Table, instrument: Reading, units: Sequence[str]) -> Int64Array:
@@ -46,5 +46,5 @@ class Lines(Field):
         return np.array(table.lines, dtype=np.int64)
 
     def columns(self, m: Any, units: Sequence[str]) -> Iterator[WrittenColumn]:
-        """None."""
+        """Return no names: the column is read elsewhere."""
         return iter(())

@@ -28,7 +28,7 @@ class Tension(Field):
         return of_actuators(self.name, given, m.actuators.shape, self.blank)
 
     def names(self, actuators: Collection[str], components: Collection[str]) -> set[str]:
-        """One for all actuators, or one for each."""
+        """Return the names of the columns: one for all actuators, or one for each."""
         return {self.name, *(f"{self.name}.{q}" for q in actuators)}
 
     def read(self, table: Table, instrument: Reading, units: Sequence[str]) -> FloatArray | None:
@@ -41,7 +41,7 @@ class Tension(Field):
         )
 
     def columns(self, m: Any, units: Sequence[str]) -> Iterator[WrittenColumn]:
-        """One for each actuator."""
+        """Write a column for each actuator."""
         if self.of(m) is not None:
             yield from numbered(self.name, "N", self.of(m))
 

@@ -98,7 +98,7 @@ class Closures:
         self.c, self.rho = spheres[..., 3:6], spheres[..., 6]
 
     def __call__(self, u: Array) -> tuple[Array, Array, FloatArray, FloatArray, FloatArray]:
-        """At u (N, 12).
+        """Evaluate the closures at u (N, 12).
 
         Returns F (N, 12), F' (N, 12, 12), what both are below if every term counts with its
         absolute value, and how fast each row of F' changes at most (12,).

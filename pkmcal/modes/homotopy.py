@@ -79,7 +79,7 @@ class _Family:
 
 @cache
 def _families() -> tuple[_Family, ...]:
-    """All start systems, those with the fewest paths first."""
+    """Return start systems, those with the fewest paths first."""
     text = (files("pkmcal.modes") / "modes.json").read_text(encoding="utf-8")
     found = []
     for name, family in json.loads(text).items():

@@ -22,7 +22,7 @@ def cross_matrix(vector: FloatArray) -> FloatArray:
 def straight(
     start: FloatArray, end: FloatArray, s: tuple[FloatArray, FloatArray, FloatArray]
 ) -> FloatArray:
-    """On the way between two poses: the origin on a line, the orientation about one axis (SLERP).
+    """Interpolate between two poses: origin on a line, orientation about one axis (SLERP).
 
     Parameters
     ----------

@@ -30,7 +30,7 @@ class Sample(Protocol):
 
     @property
     def actuators(self) -> FloatArray:
-        """Their coordinates (N, n)."""
+        """Return coordinates of the actuators at times, (N, n)."""
 
 
 class Sampled(Protocol):
@@ -42,7 +42,7 @@ class Sampled(Protocol):
 
     @property
     def start(self) -> FloatArray:
-        """Its first pose (6,)."""
+        """First pose (6,) of the move."""
 
     @property
     def duration(self) -> float:

@@ -73,7 +73,7 @@ def jumps(
 
 
 def said(found: Sequence[Jump]) -> str:
-    """That speeds jump, in one sentence."""
+    """Say that speeds jump, in one sentence."""
     first = ", ".join(f"q{jump.actuator} at {jump.time:.4f} s" for jump in found[:_LISTED])
     more = f" and {len(found) - _LISTED} more" if len(found) > _LISTED else ""
     return (

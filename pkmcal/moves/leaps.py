@@ -26,7 +26,7 @@ class Sample(Protocol):
 
     @property
     def twist(self) -> FloatArray:
-        """Their twists (ω, v), (N, 6)."""
+        """Return the platform's twists (ω, v) at times, (N, 6)."""
 
 
 def apart(poses: FloatArray, others: FloatArray, length: float) -> FloatArray:

@@ -37,11 +37,11 @@ class Sample(Protocol):
 
     @property
     def velocities(self) -> FloatArray:
-        """Their speeds (N, n)."""
+        """Return speeds of the actuators, (N, n)."""
 
     @property
     def accelerations(self) -> FloatArray:
-        """Their accelerations (N, n)."""
+        """Return accelerations of the actuators, (N, n)."""
 
 
 def peaks(sample: Callable[[FloatArray], Sample], duration: float) -> tuple[FloatArray, FloatArray]:

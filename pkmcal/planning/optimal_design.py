@@ -238,7 +238,7 @@ class Design:
     def _exchange(
         self, chosen: list[int], ridge: FloatArray, among: IntArray
     ) -> tuple[list[int], bool]:
-        """One member exchanged for the best among these candidates, if one wants to be."""
+        """Exchange one member for the best of these candidates, if that is an improvement."""
         for i in self._least(chosen, ridge):
             others = [j for j in chosen if j != i]
             if len(among) == len(self._all):
@@ -332,7 +332,7 @@ class Design:
     def _changes(
         self, blocks: FloatArray, chosen: IntArray, sign: float, ridge: FloatArray
     ) -> FloatArray:
-        """By how much the criterion changes if a block is added to the chosen ones, or removed."""
+        """Return the change of the criterion by adding a block to the chosen, or removing it."""
         covariance = np.asarray(np.linalg.inv(self._information(chosen) + ridge), np.float64)
         found = [
             self._change(blocks[some], covariance, sign) for some in lots(len(blocks), _TOGETHER)

@@ -116,7 +116,7 @@ class Angle(Reading):
         return self, values
 
     def found_in(self, table: Table) -> list[str]:
-        """Each column ``angle:JOINT``."""
+        """Find the columns ``angle:JOINT``."""
         return [name for name in table.columns if _COLUMN.fullmatch(name)]
 
     def names(self, table: Table) -> set[str]:

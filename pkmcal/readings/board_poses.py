@@ -190,7 +190,7 @@ def _projection(point: FloatArray, direction: FloatArray, picture: IntArray) -> 
 
 
 def _of_flat(plane: FloatArray, size: float) -> tuple[list[FloatArray], FloatArray]:
-    """Both turnings (P, 3, 3) of flat boards and their middle (P, 3), by how the middle is seen.
+    """Return both rotations (P, 3, 3) of flat boards and their middle (P, 3).
 
     The derivative of the projection at the middle of the board is that of an affine camera along
     the line of sight, which two turnings fulfil (T. Collins, A. Bartoli, Infinitesimal plane-based

@@ -236,7 +236,7 @@ class Camera(Reading):
             yield Dependence("size", "size", np.zeros((count, 1)), {"": number}, every)
 
     def starts(self, machine: Any, sets: Sets, found: Starts) -> None:
-        """At the platform; `places_seen` puts it in its place together with the frame."""
+        """Start at the platform; `places_seen` finds the place together with the frame."""
         for data, _ in sets:
             thing = data.measured.instrument._carried_thing
             found["tool", thing] = Start(tuple(range(6)), np.zeros(6))

@@ -41,7 +41,7 @@ class Measured(Protocol):
 
     @property
     def target_names(self) -> tuple[str, ...] | None:
-        """Their names."""
+        """Names of the targets."""
 
     @property
     def group(self) -> Int64Array | None:
@@ -49,7 +49,7 @@ class Measured(Protocol):
 
     @property
     def drive_state(self) -> DriveState:
-        """From where actuators came, and the tension of what they drive."""
+        """Return actuators' approaches, and tensions of what they drive."""
 
     def of_points(self, place: FloatArray | None) -> FloatArray:
         """A point of every row (N, 3), of one, one a row or one for each target."""

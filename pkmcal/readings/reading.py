@@ -339,7 +339,7 @@ class Reading:
 
     @property
     def families(self) -> tuple[Family, ...]:
-        """Its components by their unit: what may be wrong by itself, lengths or angles, say."""
+        """Return the components by unit: lengths or angles, say, may be wrong by themselves."""
         return tuple(
             Family(unit, tuple(k for k, each in enumerate(self.units) if each == unit))
             for unit in dict.fromkeys(self.units)
@@ -432,7 +432,7 @@ class Reading:
         return dataclasses.replace(self, **changes)  # type: ignore[type-var]
 
     def approached(self, actuators: FloatArray, first: FloatArray | None) -> FloatArray | None:
-        """From where actuators (N, n) came to the second place of each row, (N, n).
+        """Return the approach of actuators (N, n) to the second place of each row, (N, n).
 
         `first` is from where they came to the first; None: not known.
         """
@@ -488,6 +488,6 @@ class Reading:
         return self.columns(units)
 
     def points(self, m: Measured) -> dict[str, FloatArray]:
-        """Its own points of every row (N, 3), mm, as far as they are stated, by name."""
+        """Return the reading's own points of every row (N, 3), mm, as far as stated, by name."""
         own = {name: getattr(self, name) for name in self.own_points}
         return {name: m.of_points(place) for name, place in own.items() if place is not None}

@@ -50,7 +50,7 @@ def is_name(text: str) -> bool:
 
 
 def names(argument: str, given: Sequence[str] | TextArray, rows: int) -> TextArray:
-    """One name per row; of one row the name alone will do."""
+    """Check names, one per row; of one row the name alone will do."""
     if isinstance(given, str) and rows == 1:
         given = [given]
     found = words(argument, given.tolist() if isinstance(given, np.ndarray) else given)

@@ -138,7 +138,7 @@ class Touch(Reading):
     def of_rows(
         self, values: Any, actuators: FloatArray, targets: int | None
     ) -> tuple[Touch, ArrayLike | None]:
-        """One name a row; the values may be these names."""
+        """Check the names, one a row; the values may be these names."""
         rows_, argument, touched = len(actuators), "touched", self.touched
         if touched is None:
             if isinstance(values, str) and rows_ == 1:
@@ -179,7 +179,7 @@ class Touch(Reading):
         return Touch(np.array(table.texts(name)), artefact, known)
 
     def columns_read(self, table: Table) -> Components:
-        """Those of the components that are there: none where the machine touched alone."""
+        """Return the components' columns that are there: none where the machine touched alone."""
         return tuple(pair for pair in self.components if pair[0] in table.columns)
 
     def value_columns(self, values: FloatArray) -> Iterator[WrittenColumn]:
@@ -225,7 +225,7 @@ class TouchDistance(Reading):
         return _of_touched(place, anchor)
 
     def dependences(self, data: InFit) -> Iterator[Dependence]:
-        """Both artefacts."""
+        """Return the artefacts as dependences."""
         one, other = zip(*((one, other) for one, other, _, _ in self.distances), strict=True)
         yield always("place", "touch", PLACE, one, data.starts)
         yield always("anchor", "touch", POINT, other, data.starts)
@@ -235,7 +235,7 @@ class TouchDistance(Reading):
         return []
 
     def names(self, table: Table) -> set[str]:
-        """None."""
+        """Return no names of columns: they are read elsewhere."""
         return set()
 
 

@@ -240,7 +240,7 @@ def _tilts(
 
 
 def _frame_turning(frame: FloatArray | None, origin: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """From the base's axes to the instrument's (3, 3), and turnings there by the frame's angles."""
+    """Return the rotation from base to instrument (3, 3), and its turnings by the frame."""
     if frame is None:
         return np.eye(3), np.zeros((3, 3))
     outer = orientation.rotations(origin[None, 3:])[0]

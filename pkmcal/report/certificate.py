@@ -264,7 +264,7 @@ def _shown(stated: Statement, read: tuple[float, float] | None) -> str:
 
 
 def _reference(found: Identification) -> str:
-    """At which temperature the lengths of the machine are what was identified."""
+    """State the temperature at which the machine's lengths are those identified."""
     if found.expansion:
         return f"{REFERENCE:g} °C (ISO 1): the lengths stated are those at it"
     return f"{REFERENCE:g} °C (ISO 1): not reduced to it, lengths are as at the measurement"
@@ -283,7 +283,7 @@ def _expansion(found: Identification, stated: Statement) -> str:
 
 
 def _extent(positions: FloatArray) -> dict[str, list[float]]:
-    """From where to where the tool goes along each axis, mm."""
+    """State the extent of the tool's positions along each axis, mm."""
     if not len(positions):
         return {}
     ends = zip(positions.min(axis=0).tolist(), positions.max(axis=0).tolist(), strict=True)

@@ -51,7 +51,7 @@ class WorkspaceAccuracy:
 
     @property
     def predicted(self) -> FloatArray:
-        """Those of `accuracy` that are finite."""
+        """Return the finite entries of `accuracy`."""
         return self.accuracy[np.isfinite(self.accuracy)]
 
 

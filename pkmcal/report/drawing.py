@@ -100,7 +100,7 @@ def sample(count: int, first: BoolArray | None = None) -> IntArray:
 
 
 def _spaced(rows: IntArray, most: int) -> IntArray:
-    """At most so many of these, the ends among them."""
+    """Choose at most so many entries, the ends included."""
     if len(rows) <= most:
         return rows
     return rows[np.round(np.linspace(0, len(rows) - 1, most)).astype(np.intp)]

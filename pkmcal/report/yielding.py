@@ -85,7 +85,7 @@ class Yielding:
         return matrix_cells(self.matrix)
 
     def static_rows(self) -> list[tuple[float, list[float]]]:
-        """Each force with how far it moves the tool along +x, -x, +y, -y, +z, -z, mm."""
+        """List forces with the tool's motion along +x, -x, +y, -y, +z, -z, mm."""
         if self.static is None:
             return []
         sizes = np.linalg.norm(self.static.displacement, axis=2).T

@@ -53,7 +53,7 @@ class Contribution:
 
     @property
     def share(self) -> float:
-        """Its part of the combined standard uncertainty, in the unit of the result."""
+        """Share of the combined standard uncertainty, in the unit of the result."""
         return abs(self.sensitivity) * self.standard
 
 

@@ -146,7 +146,7 @@ class _Model:
         self.floor = _TINY * float(self.square.sum() / self.count.sum())
 
     def at(self, theta: FloatArray) -> _Point | None:
-        """At variances (c,); None where a class has no freedom left."""
+        """Evaluate at variances (c,); None where a class has no freedom left."""
         weighted = self._inner / theta[:, None, None]
         normal = weighted.sum(axis=0) + self._known
         plain = np.linalg.inv(normal)

@@ -35,7 +35,7 @@ def beyond(model: Model) -> str:
 
 
 def data(robot: Robot, cloud: bool) -> dict[str, Any]:
-    """All that the page needs of a robot, as JSON has it; mm and rad.
+    """Return the page's data of a robot as JSON has it; mm and rad.
 
     With `cloud` the positions of good poses too, which take a while to find.
     """
@@ -153,5 +153,5 @@ def _frames(robot: Robot) -> dict[str, Any] | None:
 
 
 def _number(value: float) -> float | None:
-    """None for what JSON has no number for."""
+    """Return a number for JSON; None where it has none."""
     return value if np.isfinite(value) else None

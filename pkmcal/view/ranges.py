@@ -22,7 +22,7 @@ _ANGLE, _LENGTH = np.radians(30.0), 0.2  # where the machine says nothing: rad, 
 
 
 def poses(robot: Robot, size: float, most: float) -> dict[str, tuple[float, float]]:
-    """From where to where each coordinate of the pose alone goes from home, mm and rad.
+    """Return the range of each coordinate of the pose alone from home, mm and rad.
 
     No farther than `most`, mm.
     """
@@ -38,7 +38,7 @@ def poses(robot: Robot, size: float, most: float) -> dict[str, tuple[float, floa
 def sliders(
     robot: Robot, ranges: dict[str, tuple[float, float]], most: float
 ) -> list[tuple[float, float]]:
-    """From where to where the slider of each coordinate goes: beyond what is reached."""
+    """Return the range of each coordinate's slider: beyond what is reached."""
     return [_within(robot, name, beyond(ends), most) for name, ends in ranges.items()]
 
 
@@ -71,7 +71,7 @@ def actuators(
     strokes: list[tuple[float, float] | None],
     ranges: dict[str, tuple[float, float]],
 ) -> list[list[float]]:
-    """From where to where each actuator goes: its stroke, or what the poses ask for."""
+    """Return the range of each actuator: its stroke, or what the poses ask for."""
     at = robot.inverse(robot.home)
     corners = np.repeat(robot.home[None], 2 * len(ranges), axis=0)
     for k, (name, ends) in enumerate(ranges.items()):

@@ -32,7 +32,7 @@ class Skeleton:
 
     @property
     def joints(self) -> FloatArray:
-        """All joints, in the same order for the same machine."""
+        """Return the joints, in the same order for the same machine."""
         return np.concatenate([*self.limbs, self.platform])
 
 

@@ -34,7 +34,7 @@ _TILTED = np.radians(5.0)  # between pictures, of a board that is tilted enough 
 
 
 class Picture(NamedTuple):
-    """One picture and what is in it.
+    """A picture and its corners.
 
     Attributes
     ----------
