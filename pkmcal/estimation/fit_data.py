@@ -1,4 +1,4 @@
-"""What readings depend on beside the pose: points, zeros, artefacts; given, or estimated."""
+"""Dependences of readings beside the pose: points, zeros, artefacts; fixed or estimated."""
 
 from __future__ import annotations
 
@@ -52,20 +52,20 @@ class FitData:
 
     @property
     def framed(self) -> bool:
-        """Whether these readings depend on the unknown frame."""
+        """True if these readings depend on the unknown frame."""
         instrument = self.measured.instrument
         return bool(instrument.framed and (self.unknown_frame or not instrument.placed))
 
     @property
     def axis(self) -> IntArray | None:
-        """Of touched lines and planes, which axis of its own each row's has, (N,)."""
+        """The artefact's own axis in each row, (N,), of touched lines and planes."""
         touched = self.measured.touched
         if touched is None:
             return None
         return np.array([self.starts["touch", name].axis for name in touched.tolist()])
 
     def dependences(self) -> Iterator[Dependence]:
-        """What the readings depend on beside the pose and the frame.
+        """Return the dependences of the readings beside pose and frame.
 
         Raises
         ------

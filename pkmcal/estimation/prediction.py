@@ -1,4 +1,4 @@
-"""What instruments should read at given poses, and how that follows the parameters."""
+"""Predicted readings of instruments at given poses, and their derivatives."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ Part = tuple[int, slice, FloatArray]  # a set, rows of it, and their derivative 
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """What the instruments should read at given poses, and its derivatives.
+    """The predicted readings of instruments at given poses, and their derivatives.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class Prediction:
 
     @classmethod
     def of(cls, datasets: Sequence[FitData], parameters: Parameters) -> Prediction:
-        """Of the rows to be fitted or held out.
+        """Make the prediction of the rows to be fitted or held out.
 
         Raises
         ------
@@ -113,7 +113,7 @@ class Prediction:
 
     @cached_property
     def guess(self) -> RowStates:
-        """Where a search for the poses begins: at home, or where they were read."""
+        """Return the start of a search for the poses: home, or the poses that were read."""
         table = self.table
         guess = np.tile(self.parameters.robot.home, (len(table.actuators), 1))
         for i, (measured, place) in enumerate(zip(table.sets, table.pose_of, strict=True)):
@@ -148,7 +148,7 @@ class Prediction:
                 )
 
     def arguments_of(self, i: int, theta: FloatArray) -> dict[str, FloatArray]:
-        """What readings of set `i` depend on beside the pose, (N, w) each, for `predict`."""
+        """Return what readings of set `i` depend on beside the pose, (N, w) each, for `predict`."""
         found = dict(self.given[i])
         for name, columns in self.columns[i].items():
             found[name] = np.where(columns == NONE, found[name], theta[columns])
@@ -204,7 +204,7 @@ class Prediction:
     def _moved(
         self, i: int, predicted: Predicted, pose: FloatArray, theta: FloatArray
     ) -> Predicted:
-        """What is read of set `i` where effects have moved the platform."""
+        """Predict readings of set `i` where effects have moved the platform."""
         effects = self.effects[i]
         if not effects:
             return predicted
@@ -235,7 +235,7 @@ class Prediction:
         return replace(predicted, values=values, by=by)
 
     def _place(self, i: int, pose: FloatArray, theta: FloatArray) -> At:
-        """Where the machine is in the rows of set `i`."""
+        """Return the machine's place in the rows of set `i`."""
         measured, other = self.table.sets[i], self.table.other_of[i]
         return At(
             pose[self.table.pose_of[i]],

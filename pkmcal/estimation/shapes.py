@@ -1,4 +1,4 @@
-"""Whether what readings and effects return has the shapes that their classes promise.
+"""Check whether what readings and effects return has the shapes that their classes promise.
 
 A user's class may return anything: here it is named, before an array does not fit another one.
 """

@@ -1,4 +1,4 @@
-"""Where what readings depend on is found with the nominal machine: where the search starts.
+"""Start of what readings depend on, found with the nominal machine.
 
 Zeros of runs, mountings of sensors and touched things have no present value; each follows in closed
 form from the poses of the machine as it is described. A plane or a line is counted from the axis of

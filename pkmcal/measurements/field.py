@@ -85,7 +85,7 @@ class Field:
         return {self.name}
 
     def read(self, table: Table, instrument: Reading, units: Sequence[str]) -> Any:
-        """What a table states; None where it states nothing. `units` are those of the actuators.
+        """Read the field of a table; None where it states nothing. `units` are the actuators'.
 
         By default its one column, of numbers or names.
         """
@@ -96,20 +96,20 @@ class Field:
         return table.numbers(self.name, self.unit or "1", blank=self.blank)[0]
 
     def columns(self, m: Any, units: Sequence[str]) -> Iterator[WrittenColumn]:
-        """Its columns in a file; by default one of the entries (N,), none where it is None."""
+        """Write the field's columns; by default one of the entries (N,), none where it is None."""
         if self.of(m) is not None:
             yield WrittenColumn(self.name, self.unit or "", self.of(m))
 
     def framed(self, m: Any) -> Iterator[WrittenColumn]:
-        """Its columns in a data frame."""
+        """Return the field's columns in a data frame."""
         return self.columns(m, m.actuator_units or ("mm",) * m.actuators.shape[1])
 
     def printed(self, m: Any) -> Iterator[WrittenColumn]:
-        """Its columns in the printed table."""
+        """Return the field's columns in the printed table."""
         return iter(())
 
     def said(self, m: Any) -> str:
-        """What the title of the printed table says of it, or nothing."""
+        """Return the field's words in the title of the printed table, or nothing."""
         return ""
 
 
@@ -181,7 +181,7 @@ def one_or_each(name: str, units: Sequence[str], values: FloatArray) -> Iterator
 def values_array(
     given: ArrayLike | None, instrument: Reading, rows: tuple[int, ...], alone: bool
 ) -> FloatArray:
-    """What was read, (N, k) or (N,); NaN where nothing was, of orientations as a whole."""
+    """Return readings, (N, k) or (N,); NaN where nothing was read, of orientations as a whole."""
     kind, k = instrument.name, len(instrument.components)
     if given is None:
         if k:
@@ -216,7 +216,7 @@ def values_array(
 
 
 def units_of_actuators(given: str | Sequence[str] | None, count: int) -> tuple[str, ...] | None:
-    """One unit per actuator, "mm" or "rad"; None where none is given."""
+    """Return a unit per actuator, "mm" or "rad"; None where none is given."""
     if given is None:
         return None
     units = words("actuator_units", given)

@@ -359,7 +359,7 @@ def _known(
 
 
 def _reading(table: Table, several: tuple[str, ...], readings: Sequence[Reading]) -> Reading:
-    """What was measured, by the columns that are there."""
+    """Read the measured quantity, by the columns that are there."""
     found: dict[str, Reading] = {}
     for each in readings:
         for title in each.found_in(table):
@@ -379,7 +379,7 @@ def _read_values(
     rotation: str | None,
     nominal: Callable[[], FloatArray | None],
 ) -> FloatArray | None:
-    """What was measured, (N, k) or (N,); None without columns of it."""
+    """Read the values, (N, k) or (N,); None without their columns."""
     form = orientation_in(table.columns)
     own = form == ANGLES and rotation in (None, OWN_ORDER)
     if read.turning is not None and form and not own:

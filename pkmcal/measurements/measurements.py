@@ -1,4 +1,4 @@
-"""What was measured on a machine: actuator readings and, beside them, poses, points or lengths."""
+"""Measurements of a machine: actuator readings and, beside them, poses, points or lengths."""
 
 from __future__ import annotations
 
@@ -275,7 +275,7 @@ class Measurements(Result):
         return np.array(np.broadcast_to(place, (len(self), 3)), order="C")
 
     def __getattr__(self, name: str) -> Any:
-        """Of the instrument: `run`, `touched`, `attachment` …; None where it has none."""
+        """Return an attribute of the instrument: `run`, `touched`, …; None where it has none."""
         if name in OF_MEASUREMENTS and "instrument" in vars(self):
             none = () if name == "touch_distances" else None
             return getattr(self.instrument, OF_MEASUREMENTS[name], none)
@@ -283,7 +283,7 @@ class Measurements(Result):
 
     @property
     def pose_index(self) -> Int64Array:
-        """Which pose each row belongs to, (N,), counted from 0.
+        """Pose of each row, (N,), counted from 0.
 
         Rows of one `group` are of one pose, and rows at the same actuators.
         """
@@ -291,7 +291,7 @@ class Measurements(Result):
 
     @property
     def drive_state(self) -> DriveState:
-        """From where actuators came, tensions as far as they were read, and what was carried."""
+        """Return actuators' approaches, tensions as far as they were read, and the load."""
         tension = None if self.tension is None else filled_tension(self.tension)
         return DriveState(self.approach, tension, self.load)
 

@@ -1,4 +1,4 @@
-"""What readings depend on beside the pose: numbers that are given or estimated."""
+"""Dependences of readings beside the pose: numbers that are fixed or estimated."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Numbers:
 
 @dataclass(frozen=True, eq=False)
 class Dependence:
-    """What an argument of `Reading.predict` is in the rows of a set.
+    """A dependence: an argument of `Reading.predict` in the rows of a set.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class Dependence:
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """Where an artefact, a zero or a sensor is found with the nominal machine.
+    """The start of an artefact, a zero or a sensor, found with the nominal machine.
 
     Attributes
     ----------
