@@ -26,7 +26,7 @@ Criterion = Literal["prediction", "D", "A"]
 CRITERIA: tuple[Criterion, ...] = ("prediction", "D", "A")
 
 _SHORTLIST = 1000  # candidates that help most, which exchanges are first sought among
-_RENEWED = 5  # members that grow on one shortlist
+_RENEWED = 10  # members that grow on one shortlist
 _TRIED = 12  # members that matter least, one of which must want to be exchanged
 _TOGETHER = 512  # candidates that are looked at at once, as many as caches hold
 _ALIKE = 1e-6  # share by which an exchange must gain; rounding moves gains by up to 1e-7
@@ -81,7 +81,7 @@ class Design:
         unit = self._unit = basis[:, :rank] / singular[:rank]
         self.unidentifiable = basis[:, rank:]
         self._determinant = criterion == "D"
-        self._blocks, self._all = blocks @ unit, np.arange(len(blocks))
+        self._blocks, self._all = _times(blocks, unit), np.arange(len(blocks))
         self._prior = (prior @ unit).T @ (prior @ unit)
         metric = unit.T @ unit  # of the scaled parameters
         self._ridge = metric / worst**2
@@ -351,5 +351,5 @@ class Design:
 
 def _times(blocks: FloatArray, matrix: FloatArray) -> FloatArray:
     """Blocks (N, k, n) times a matrix (n, n), in one product, which takes less time than N."""
-    product: FloatArray = (blocks.reshape(-1, len(matrix)) @ matrix).reshape(blocks.shape)
+    product: FloatArray = (blocks.reshape(-1, len(matrix)) @ matrix).reshape(*blocks.shape[:2], -1)
     return product

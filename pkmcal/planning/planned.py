@@ -235,6 +235,8 @@ def compressed(blocks: FloatArray) -> FloatArray:
 
 def together(parts: Sequence[FloatArray]) -> FloatArray:
     """Blocks (N, k, n) of several sets as one, with rows of zeros where one has fewer equations."""
+    if len(parts) == 1:
+        return parts[0]
     most = max(part.shape[1] for part in parts)
     padded = [np.pad(part, ((0, 0), (0, most - part.shape[1]), (0, 0))) for part in parts]
     return np.concatenate(padded)
