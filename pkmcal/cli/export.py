@@ -62,7 +62,7 @@ def export(
 
 
 def _listed() -> str:
-    """What each target writes, those of serial arms last."""
+    """Say what each target writes, those of serial arms last."""
     each = targets().values()
     others = "; ".join(f"{t.name}: {t.about}" for t in each if t.takes != "arm")
     arms = "; ".join(f"{t.name}: {t.about}" for t in each if t.takes == "arm")

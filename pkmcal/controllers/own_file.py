@@ -1,4 +1,4 @@
-"""How numbers are written for a firmware: as lines of their own, or into the user's own file."""
+"""Numbers written for a firmware: as lines of their own, or into the user's own file."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Path = str | PathLike[str]
 
 
 class Wanted(NamedTuple):
-    """What is written.
+    """Options of what is written.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Which numbers of a calibration are parameters: what is free, of which sessions and sets.
+"""Choice of the parameters of a calibration: what is free, in which sessions and sets.
 
 And with which start, prior and bounds, by the names that the user states.
 """
@@ -145,7 +145,7 @@ def _scales(
     like: Parameters | None,
 ) -> FloatArray:
     """Complete scales (n,) by those of units where they are NaN; those of `like` come first."""
-    for i in np.flatnonzero(np.isnan(scale)):
+    for i in np.flatnonzero(np.isnan(scale)).tolist():
         scale[i] = _scale(of_unit, names[i], units[i])
     if like is None:
         return scale
@@ -326,7 +326,7 @@ def _matching(argument: str, pattern: object, names: Sequence[str], strict: bool
 def _prior(
     asked: Asked, names: Sequence[str], scale: FloatArray, of_machine: int, strict: bool
 ) -> FloatArray:
-    """What is known of each parameter: as effects have it, but where `prior` names it."""
+    """Return the prior of each parameter: as effects state it, unless `prior` names it."""
     prior = asked.prior
     sigma = np.full(len(names), np.inf)
     of_effects = [asked.of_effects.get(name.partition("@")[0], np.inf) for name in names]

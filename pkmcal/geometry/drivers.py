@@ -16,7 +16,7 @@ from pkmcal.core.pulleys import BENT
 
 @dataclass(frozen=True, eq=False)
 class Driver:
-    """How an actuator moves a limb.
+    """A way in which an actuator moves a limb.
 
     Attributes
     ----------
@@ -59,22 +59,22 @@ class Driver:
 
     @property
     def bent(self) -> bool:
-        """Whether the limb is no distance between two points: the core knows others for it."""
+        """True if the limb is no distance between two points: the core knows others for it."""
         return self.core != self.name
 
     @property
     def has_base_axis(self) -> bool:
-        """Whether the limb has an axis on its base side because of its driver."""
+        """True if the limb has an axis on its base side because of its driver."""
         return self.carries or self.swivels
 
     @property
     def slides(self) -> bool:
-        """Whether the anchor is a carriage, along the base axis."""
+        """True if the anchor is a carriage, along the base axis."""
         return self.carries and self.unit == "mm"
 
     @property
     def turns(self) -> bool:
-        """Whether the anchor turns about the base axis, by the actuator's angle."""
+        """True if the anchor turns about the base axis, by the actuator's angle."""
         return self.carries and self.unit == "rad"
 
     @property

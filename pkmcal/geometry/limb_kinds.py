@@ -19,7 +19,7 @@ POINT_SLOTS = SLOTS[:6]
 
 @dataclass(frozen=True)
 class LimbKind:
-    """What a robot file says about one kind of limb.
+    """A kind of limb, as a robot file states it.
 
     Attributes
     ----------

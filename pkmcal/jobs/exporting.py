@@ -24,7 +24,7 @@ from pkmcal.loading import load, load_parallel
 
 @dataclass(frozen=True)
 class Exported:
-    """What was written.
+    """The files that were written.
 
     Attributes
     ----------
