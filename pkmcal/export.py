@@ -12,11 +12,14 @@ from pkmcal.controllers.loss import Loss
 from pkmcal.controllers.maslow import maslow
 from pkmcal.controllers.mjcf import mjcf
 from pkmcal.controllers.sdf import sdf
+from pkmcal.controllers.target import Target
+from pkmcal.controllers.targets import register, targets
 from pkmcal.controllers.urdf import urdf
 
 __all__ = [
     "Loss",
     "Printer",
+    "Target",
     "c_header",
     "dh",
     "fmu",
@@ -26,8 +29,10 @@ __all__ = [
     "marlin",
     "maslow",
     "mjcf",
+    "register",
     "reprap",
     "sdf",
+    "targets",
     "universal_robots",
     "urdf",
 ]

@@ -109,10 +109,10 @@ def as_chains(robot: Robot) -> str:
         drive = f"actuator = {limb.actuator + 1}, home_value = {float(q[limb.actuator])!r}"
         joints = []
         kind, frame = KINDS[limb.kind], limb.frame
-        if kind.driver == "length":
+        if kind.driver.name == "length":
             first = '"R", axis = ' + str(frame[:, 2].tolist()) if limb.kind == "RPS" else '"U"'
             joints += [f"kind = {first}, at = {base.tolist()}", f'kind = "P", {drive}']
-        elif kind.driver == "slider":
+        elif kind.driver.name == "slider":
             carriage = base + q[limb.actuator] * frame[:, 2]
             axis = frame[:, 2].tolist()
             joints.append(f'kind = "P", at = {base.tolist()}, axis = {axis}, {drive}')
@@ -157,14 +157,14 @@ def same_errors(robot: Robot, limb_errors: dict[str, float]) -> dict[str, float]
             add(f"{n}.platform.d{c}", limb_errors.get(f"platform{i + 1}.{c}", 0.0))
         if f"offset{i + 1}" in limb_errors:
             add(f"offset{limb.actuator + 1}", limb_errors[f"offset{i + 1}"])
-        if kind.driver == "length":
+        if kind.driver.name == "length":
             continue
         base, platform = (
             np.array([robot.geometry[f"{side}{i + 1}.{c}"] for c in "xyz"])
             for side in ("base", "platform")
         )
         tip = (pk.screw.from_pose(robot.home) @ [*platform, 1.0])[:3]
-        if kind.driver == "slider":
+        if kind.driver.name == "slider":
             start = base + q[limb.actuator] * limb.frame[:, 2]
         else:
             way = crank_direction(robot, i, q)

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from pathlib import PurePath
 
+from pkmcal.controllers.targets import targets
 from pkmcal.jobs.calibration import Writing
 from pkmcal.jobs.configuration import Exporting
 from pkmcal.jobs.project import Project
 from pkmcal.jobs.stated import quoted
 
 REPORT, PLAN = "report", "plan"  # folders of the calibrated machine, and of planned poses
-_NAMES = {"c": "machine.h", "linuxcnc": "linuxcnc", "mjcf": "machine.xml", "fmu": "machine.fmu",
-          "urdf": "machine.urdf", "sdf": "machine.sdf"}  # fmt: skip
-
-OUTPUTS = frozenset(_NAMES.values())
+OUTPUTS = frozenset(target.file for target in targets().values())
 
 
 def commands(project: Project) -> dict[str, list[str]]:
@@ -38,5 +36,15 @@ def commands(project: Project) -> dict[str, list[str]]:
 
 def export(target: str) -> Exporting:
     """Return what writes the calibrated machine for a controller."""
-    name = _NAMES.get(target, f"for_{target}.txt")
+    known = targets().get(target)
+    name = f"for_{target}.txt" if known is None else known.file
     return Exporting(str(PurePath(REPORT) / "robot.toml"), target, name)
+
+
+def offered(arm: bool) -> list[tuple[str, str]]:
+    """Return names and labels of the targets that take a serial arm, or a parallel machine."""
+    takes = "arm" if arm else "parallel"
+    every = targets().values()
+    return [
+        (each.name, each.label) for each in every if each.label and each.takes in (takes, "any")
+    ]

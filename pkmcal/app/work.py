@@ -18,7 +18,7 @@ from typing import Any
 
 import pkmcal as pk
 from pkmcal.app import telling
-from pkmcal.app.commands import PLAN, REPORT, export
+from pkmcal.app.commands import PLAN, REPORT, export, offered
 from pkmcal.app.folder import named
 from pkmcal.app.names import safe_name
 from pkmcal.checks.check_geometry import check_geometry
@@ -181,7 +181,9 @@ def out(work: Work, state: Table, given: Table, say: Say) -> Table:
             old, new = (Path(each).read_text("utf-8", "replace").splitlines()
                         for each in (job.config, name))  # fmt: skip
             changed += difflib.unified_diff(old, new, job.config, name, n=1, lineterm="")
-    return {"files": files, "changed": changed, "commands": [quoted(job.argv()) for job in exports]}
+    lines = [quoted(job.argv()) for job in exports]
+    others = offered(isinstance(robot, pk.SerialArm))
+    return {"files": files, "changed": changed, "commands": lines, "targets": others}
 
 
 def report(work: Work, state: Table, given: Table, say: Say) -> Table:

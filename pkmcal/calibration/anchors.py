@@ -128,12 +128,13 @@ def locate_anchors(robot: Robot, actuators: ArrayLike) -> LocatedAnchors:
 
 def _dimensions(robot: Robot) -> int:
     """Free coordinates of a point platform with limbs of variable length."""
-    drivers = {KINDS[limb.kind].driver for limb in robot.model.limbs}
+    drivers = [KINDS[limb.kind].driver for limb in robot.model.limbs]
+    legs = not any(driver.carries or driver.bent for driver in drivers)
     beside = any(KINDS[limb.kind].all_rows(limb.couple > 0) for limb in robot.model.limbs)
     m = _MAPS.get(robot.model.map)
     joints = robot.slots[:, 3:6]
     apart = float(np.abs(joints - joints[0]).max())
-    if m is None or drivers != {"length"} or beside or apart > _SAME * robot.machine.struct.size:
+    if m is None or not legs or beside or apart > _SAME * robot.machine.struct.size:
         raise ArgumentError(
             f"robot: {robot.name} is no point on limbs of variable length (pose map translation or"
             " xy, all platform joints in one point)"

@@ -107,7 +107,7 @@ def whole_size(largest: float, within: tuple[float, float]) -> Iterator[Finding]
 def _stroke_units(robot: Robot) -> Iterator[Finding]:
     for i, limb in enumerate(robot.model.limbs):
         low, high = limb.stroke or (0.0, 0.0)
-        if KINDS[limb.kind].driver == "crank" and max(-low, high) > 2 * _FULL_TURN:
+        if KINDS[limb.kind].driver.turns and max(-low, high) > 2 * _FULL_TURN:
             yield Finding(
                 "angle",
                 (i + 1,),
@@ -120,11 +120,11 @@ def _sizes(robot: Robot) -> dict[str, float]:
     """The lengths of a machine that say how large it is, mm; those that are 0 are left out."""
     base, platform = joints(robot)
     slots = robot.geometry.slots
-    cranks = [KINDS[limb.kind].driver == "crank" for limb in robot.model.limbs]
+    cranks = [KINDS[limb.kind].driver.turns for limb in robot.model.limbs]
     ends = [
         max(map(abs, limb.stroke))
         for limb in robot.model.limbs
-        if limb.stroke is not None and KINDS[limb.kind].driver != "crank"
+        if limb.stroke is not None and not KINDS[limb.kind].driver.turns
     ]
     sizes = {
         "base joints": float(np.linalg.norm(base.points, axis=1).max()),
@@ -265,7 +265,7 @@ def unreachable(robot: Robot) -> Iterator[Finding]:
 
 
 def _shown(robot: Robot, limb: int) -> tuple[float, str]:
-    crank = KINDS[robot.model.limbs[limb].kind].driver == "crank"
+    crank = KINDS[robot.model.limbs[limb].kind].driver.turns
     return (180 / np.pi, "deg") if crank else (1.0, "mm")
 
 

@@ -115,7 +115,7 @@ def along_axis(robot: Robot) -> tuple[Joints, Joints]:
 def slider_ways(robot: Robot) -> FloatArray:
     """Direction of each slider as stated (limbs, 3), unit; 0 for other limbs."""
     return np.array([
-        limb.frames["base"][:, 2] if KINDS[limb.kind].driver == "slider" else np.zeros(3)
+        limb.frames["base"][:, 2] if KINDS[limb.kind].driver.slides else np.zeros(3)
         for limb in robot.model.limbs
     ])  # fmt: skip
 
@@ -220,14 +220,16 @@ def traits(robot: Robot) -> list[Trait]:
     slot = dict(zip(SLOTS, robot.geometry.slots.T[: len(SLOTS)], strict=True))
     for driver in dict.fromkeys(KINDS[limb.kind].driver for limb in limbs):
         mine = [KINDS[limb.kind].driver == driver for limb in limbs]
-        fixed = KINDS[limbs[mine.index(True)].kind].lengths
+        fixed = KINDS[limbs[mine.index(True)].kind].driver.lengths
         rods = [Trait(key, "mm", slot[name], 1.0) for key, name in fixed.items()]
-        unit, shown, scale = ("deg", 180 / np.pi, degree) if driver == "crank" else ("mm", 1.0, 1.0)
+        unit, shown, scale = (
+            ("deg", 180 / np.pi, degree) if driver.unit == "rad" else ("mm", 1.0, 1.0)
+        )
         # from one side or the other a rail's carriage drives, and stands elsewhere
         at_home = np.full(len(limbs), np.nan) if rails else drive * shown
         own = (
             *rods,
-            Trait(f"{driver} at home", unit, at_home, scale),
+            Trait(f"{driver.name} at home", unit, at_home, scale),
             Trait("offset", unit, slot["offset"] * shown, scale),
             Trait("gain", "1", slot["gain"], mm),
             Trait("lower end of the stroke", unit, ends[:, 0] * shown, scale),

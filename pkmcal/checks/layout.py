@@ -309,7 +309,7 @@ def _of_geometry(robot: Robot, name: str) -> tuple[FloatArray, str]:
         if name == f"{side.side}_diameter":
             return 2 * side.radii, "mm"
     if name == "length":
-        mine = [not KINDS[limb.kind].has_branch for limb in robot.model.limbs]
+        mine = [not KINDS[limb.kind].driver.carries for limb in robot.model.limbs]
         return robot.feasible(robot.home).drive[mine], "mm"
     limbs = range(1, len(robot.model.limbs) + 1)
     own = [name.replace(".", f"{i}.") if "." in name else f"{name}{i}" for i in limbs]

@@ -9,9 +9,9 @@ import typer
 
 from pkmcal.cli.options import Force, Json, ParallelRobot
 from pkmcal.cli.output import say
+from pkmcal.controllers.targets import targets
 from pkmcal.jobs import exporting
 from pkmcal.jobs.configuration import Exporting
-from pkmcal.jobs.exporting import TARGETS
 from pkmcal.jobs.inputs import Inputs
 from pkmcal.report.as_json import as_json
 
@@ -20,11 +20,9 @@ def export(
     context: typer.Context,
     robot: ParallelRobot,
     target: Annotated[
-        str, typer.Option("--as", metavar="TARGET", help=f"What for: {', '.join(TARGETS)}.")
+        str, typer.Option("--as", metavar="TARGET", help=f"What for: {', '.join(targets())}.")
     ],
-    out: Annotated[
-        Path, typer.Option(metavar="PATH", help="Where to write: a file; of LinuxCNC a folder.")
-    ],
+    out: Annotated[Path, typer.Option(metavar="PATH", help="Where to write: a file, or a folder.")],
     number: Annotated[
         str | None,
         typer.Option(metavar="TYPE", help="Of a C header: double, the default, or float."),
@@ -33,8 +31,8 @@ def export(
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="Of Klipper, RepRapFirmware, a Maslow: your printer.cfg, config.g or maslow.yaml,"
-            " written with the changed numbers and otherwise as it is; by default the lines alone.",
+            help="Of a firmware: your printer.cfg, config.g or maslow.yaml, written with the"
+            " changed numbers and otherwise as it is; by default the lines alone.",
         ),
     ] = None,
     project: Annotated[
@@ -48,12 +46,7 @@ def export(
 ) -> int:
     """Write a robot for a controller.
 
-    c: a C99 header with its inverse and forward kinematics and Jacobian. klipper: the numbers of a
-    linear or rotary delta for Klipper or Kalico; reprap, marlin: its M665 and M666, or M669;
-    hangprinter: M669 and M666. maslow: the anchors of a maslow.yaml. linuxcnc: a kinematics
-    component, and a simulation that runs it. mjcf: a model for MuJoCo. fmu: an FMU for
-    co-simulation. Of serial arms: urdf and sdf, a tree of links; dh and dh-modified, a table of
-    Denavit-Hartenberg numbers; ur, the lists of a calibration.conf of Universal Robots.
+    {targets}
 
     What a controller cannot hold is refused with the reason, and nothing is written.
 
@@ -66,3 +59,14 @@ def export(
     else:
         say(f"{out}: {done}")
     return 0
+
+
+def _listed() -> str:
+    """Say what each target writes, those of serial arms last."""
+    each = targets().values()
+    others = "; ".join(f"{t.name}: {t.about}" for t in each if t.takes != "arm")
+    arms = "; ".join(f"{t.name}: {t.about}" for t in each if t.takes == "arm")
+    return f"{others}. Of serial arms: {arms}."
+
+
+export.__doc__ = (export.__doc__ or "").format(targets=_listed())

@@ -167,11 +167,7 @@ def _command(code: str, dialect: Dialect) -> tuple[Command, int]:
     head = _HEAD.match(code)
     assert head is not None  # it may be empty
     macro, letter, number = head.groups()
-    name, shown = "", "axis words"
-    if macro:
-        name = shown = macro.upper()
-    elif letter:
-        name, shown = dialect.name(letter, number or ""), letter + (number or "")
+    name, shown = _named(dialect, macro, letter, number or "")
     rest = code[head.end() :]
     if macro and dialect.several and name not in dialect.words and _NEXT.search(name):
         raise Unclear(f"{shown} has a G or M in it, with which {dialect.title} begins a command")
@@ -195,6 +191,13 @@ def _command(code: str, dialect: Dialect) -> tuple[Command, int]:
     for each, word, _ in _words(" " * head.end() + rest, dialect, code):
         _add(words, each, word)
     return Command(name, shown, frozenset(words), words), end
+
+
+def _named(dialect: Dialect, macro: str | None, letter: str | None, number: str) -> tuple[str, str]:
+    """The name of a command, "" of axis words alone, and what messages call it."""
+    if macro:
+        return macro.upper(), macro.upper()
+    return (dialect.name(letter, number), letter + number) if letter else ("", "axis words")
 
 
 def _words(code: str, dialect: Dialect, line: str) -> list[tuple[str, Word, str]]:

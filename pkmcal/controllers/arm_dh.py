@@ -73,6 +73,11 @@ def dh(
     return table
 
 
+def modified_dh(arm: SerialArm, path: str | PathLike[str]) -> DHTable:
+    """Write the numbers of the modified convention, as `dh` does."""
+    return dh(arm, path, "modified")
+
+
 def universal_robots(arm: SerialArm, path: str | PathLike[str]) -> DHTable:
     """Write the four lists of a Universal Robots ``calibration.conf``, in m and rad.
 

@@ -135,8 +135,7 @@ def _geared(robot: Robot) -> list[bool]:
 
 def _driver(limb: Limb) -> str:
     """The core's driver of a limb: a cable over a pulley is one of limbs between two points."""
-    driver = KINDS[limb.kind].driver
-    return "length" if driver == "pulley" else driver
+    return KINDS[limb.kind].driver.core
 
 
 def _needed(robot: Robot, drivers: Sequence[str], rows: Sequence[str]) -> list[str]:
@@ -197,7 +196,7 @@ def prepared(robot: Robot) -> tuple[list[FloatArray], ...]:
                 own[place] = c_source.evaluate(f"{axis}_axis", given | frame, ("axis",))[0]
         first.append(np.array(one))
         second.append(np.array(other))
-        turned = driver != "length" or limb.kind == "pulley"
+        turned = KINDS[limb.kind].driver.has_base_axis
         frames.append(limb.frame.ravel() if turned else _UNUSED_FRAME)
         axes.append(own)
     return first, second, frames, axes
@@ -207,7 +206,7 @@ def _inverse_calls(robot: Robot) -> list[str]:
     calls = ["pose_frame"]
     for limb in robot.model.limbs:
         calls += ["limb_joint", f"{_driver(limb)}_inverse", "limb_command"]
-        calls += ["limb_joint", "pulley"] if limb.kind == "pulley" else []
+        calls += ["limb_joint", "pulley"] if KINDS[limb.kind].driver.swivels else []
     return calls
 
 
@@ -216,7 +215,7 @@ def _step_calls(robot: Robot, rows: list[dict[str, Any]]) -> list[str]:
     calls = [f"map_{map}_frame", f"map_{map}_retract"]
     for limb in robot.model.limbs:
         own = KINDS[limb.kind].all_rows(limb.couple > 0)
-        calls += ["limb_joint", "pulley"] if limb.kind == "pulley" else []
+        calls += ["limb_joint", "pulley"] if KINDS[limb.kind].driver.swivels else []
         for row in ("sphere", *(row["name"] for row in rows if row["name"] in own)):
             calls += [f"{row}_row", f"map_{map}_pull"]
     return calls

@@ -15,12 +15,11 @@ no such numbers; the bed of an exported robot is level.
 
 from __future__ import annotations
 
+from functools import partial
 from os import PathLike
 
 import numpy as np
 
-from pkmcal.arguments import flag
-from pkmcal.arguments import path as as_path
 from pkmcal.arrays import FloatArray
 from pkmcal.controllers.gcode_words import (
     TOWERS,
@@ -40,13 +39,14 @@ from pkmcal.controllers.gcode_words import (
 )
 from pkmcal.controllers.linear_delta import Bed, FirmwareDelta, of_robot
 from pkmcal.controllers.loss import Loss
+from pkmcal.controllers.own_file import Wanted, write_for
 from pkmcal.controllers.reprap_files import own_config
 from pkmcal.controllers.rotary_delta import is_rotary_delta
 from pkmcal.controllers.rotary_delta import of_robot as rotary_of_robot
 from pkmcal.controllers.rotary_gcode import reprap_commands as rotary_commands
 from pkmcal.controllers.rotary_gcode import reprap_lines as rotary_lines
 from pkmcal.exceptions import ArgumentError, FileError
-from pkmcal.files.atomic import write_whole
+from pkmcal.files.text_lines import text_in
 from pkmcal.kinematics.robot import Robot
 
 
@@ -84,22 +84,22 @@ def reprap(
     OSError
         A file that cannot be read or written.
     """
-    path, project = as_path("path", path), flag("project", project)
-    place = str(as_path("config", "config.g" if config is None else config))
-    text = None if config is None else own_config(config)
+    return write_for(path, project, config, own_config, partial(_reprap, robot))
+
+
+def _reprap(robot: Robot, wanted: Wanted, text: str | None) -> tuple[str, Loss]:
+    """The lines, or the printer's file with the changed numbers."""
+    place = wanted.place
     shift = 0.0 if text is None else mean_adjustment(text, place)
     if is_rotary_delta(robot):
-        turning, loss = rotary_of_robot(robot, project, one_height=False)
+        turning, loss = rotary_of_robot(robot, wanted.project, one_height=False)
         commands = rotary_commands(turning, shift, text, place)
         new = rotary_lines(commands)
     else:
-        firmware, loss = of_robot(robot, project)
+        firmware, loss = of_robot(robot, wanted.project)
         commands = reprap_commands(firmware, shift)
         new = lines(commands)
-    if text is not None:
-        new = changed(text, place, commands)
-    write_whole(path, new.encode("utf-8", "surrogateescape"))
-    return loss
+    return new if text is None else changed(text, place, commands), loss
 
 
 def marlin(robot: Robot, path: str | PathLike[str], project: bool = False) -> Loss:
@@ -125,8 +125,12 @@ def marlin(robot: Robot, path: str | PathLike[str], project: bool = False) -> Lo
     ValueError
         The firmware cannot hold the robot, or the offset is not stated; nothing is written.
     """
-    path = as_path("path", path)
-    firmware, loss = of_robot(robot, flag("project", project))
+    return write_for(path, project, None, text_in, partial(_marlin, robot))
+
+
+def _marlin(robot: Robot, wanted: Wanted, text: str | None) -> tuple[str, Loss]:
+    """The three lines."""
+    firmware, loss = of_robot(robot, wanted.project)
     if robot.model.probe is None:
         raise ArgumentError(
             f"robot: {robot.name}: Marlin homes the nozzle to H - Z of M851 above the bed, and the"
@@ -134,8 +138,7 @@ def marlin(robot: Robot, path: str | PathLike[str], project: bool = False) -> Lo
             " the nozzle's height in mm when the probe triggers, which is -Z of M851; z = 0 for a"
             " printer without a bed probe"
         )
-    write_whole(path, marlin_text(firmware, robot.model.probe))
-    return loss
+    return marlin_text(firmware, robot.model.probe), loss
 
 
 def reprap_commands(firmware: FirmwareDelta, shift: float) -> Commands:

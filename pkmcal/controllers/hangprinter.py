@@ -10,13 +10,12 @@ of a spool. What M666 W and S say of stretch is not among these numbers.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from os import PathLike
 from typing import NamedTuple
 
 import numpy as np
 
-from pkmcal.arguments import flag
-from pkmcal.arguments import path as as_path
 from pkmcal.arrays import FloatArray
 from pkmcal.controllers import robot_files
 from pkmcal.controllers.gcode_words import (
@@ -30,10 +29,10 @@ from pkmcal.controllers.gcode_words import (
 )
 from pkmcal.controllers.laws import require_no_laws, require_no_pulleys
 from pkmcal.controllers.loss import Loss, cylinder, fitted, require_held
+from pkmcal.controllers.own_file import Wanted, write_for
 from pkmcal.controllers.reprap_files import own_config
 from pkmcal.controllers.robot_files import About
 from pkmcal.exceptions import ArgumentError, FileError
-from pkmcal.files.atomic import write_whole
 from pkmcal.geometry.laws import Law
 from pkmcal.kinematics.robot import Robot, require_parallel
 
@@ -109,12 +108,14 @@ def hangprinter(
     OSError
         A file that cannot be read or written.
     """
-    path, project = as_path("path", path), flag("project", project)
+    return write_for(path, project, config, own_config, partial(_made, robot))
+
+
+def _made(robot: Robot, wanted: Wanted, text: str | None) -> tuple[str, Loss]:
+    """The line for the anchors, or the printer's file with the changed numbers."""
     require_parallel(robot)
     spooled = _require(robot)
-    text = None if config is None else own_config(config)
-    place = str(as_path("config", "M669" if config is None else config))
-    there = None if text is None else _of_text(text, place)
+    there = None if text is None else _of_text(text, wanted.place)
     geared = None if there is None else there.spools
     if spooled and geared is None:
         raise ArgumentError(
@@ -129,11 +130,10 @@ def hangprinter(
         + (" one build-up and its gears for the spools" if spooled else " 1 for its gain")
         + ", this robot has others"
     )
-    require_held(robot, lost, project, lacks)
+    require_held(robot, lost, wanted.project, lacks)
     found = model(x)
-    new = text_of(found) if text is None else changed(text, place, _commands(found))
-    write_whole(path, new.encode("utf-8", "surrogateescape"))
-    return lost
+    new = text_of(found) if text is None else changed(text, wanted.place, _commands(found))
+    return new, lost
 
 
 def text_of(machine: Hangprinter) -> str:

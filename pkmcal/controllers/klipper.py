@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from os import PathLike
 
-from pkmcal.arguments import flag
-from pkmcal.arguments import path as as_path
 from pkmcal.controllers import linear_delta, rotary_delta
 from pkmcal.controllers.loss import Loss
+from pkmcal.controllers.own_file import Wanted, write_for
 from pkmcal.controllers.printer_config import (
     ANGLES,
     SAME,
@@ -19,7 +19,6 @@ from pkmcal.controllers.printer_config import (
     step_of,
 )
 from pkmcal.exceptions import ArgumentError
-from pkmcal.files.atomic import write_whole
 from pkmcal.kinematics.robot import Robot
 
 Values = dict[tuple[str, str], float]
@@ -70,20 +69,21 @@ def klipper(
     ...     print(pathlib.Path(folder, "lines.cfg").read_text().split()[:3])
     ['[printer]', 'delta_radius:', '105.600000']
     """
-    path, project = as_path("path", path), flag("project", project)
+    return write_for(path, project, config, read, partial(_made, robot))
+
+
+def _made(robot: Robot, wanted: Wanted, printer: PrinterConfig | None) -> tuple[str | bytes, Loss]:
+    """The lines, or the printer's file with the changed numbers."""
     turning = rotary_delta.is_rotary_delta(robot)
-    values, gains, loss = (_rotary if turning else _linear)(robot, project)
-    if config is None:
-        write_whole(path, _lines(values))
-        return loss
-    printer = read(config)
-    wanted = "rotary_delta" if turning else "delta"
-    if kinematics(printer) != wanted:
-        raise printer.wrong("printer", "kinematics", f"must be {wanted}, as {robot.name} is")
-    values = _as_in_the_file(values, printer, ANGLES[wanted])
+    values, gains, loss = (_rotary if turning else _linear)(robot, wanted.project)
+    if printer is None:
+        return _lines(values), loss
+    kind = "rotary_delta" if turning else "delta"
+    if kinematics(printer) != kind:
+        raise printer.wrong("printer", "kinematics", f"must be {kind}, as {robot.name} is")
+    values = _as_in_the_file(values, printer, ANGLES[kind])
     values |= _gearing(printer, gains, turning)
-    write_whole(path, printer.changed(values))
-    return loss
+    return printer.changed(values), loss
 
 
 def _linear(robot: Robot, project: bool) -> tuple[Values, tuple[float, ...], Loss]:

@@ -10,20 +10,19 @@ its anchors do.
 from __future__ import annotations
 
 import re
+from functools import partial
 from os import PathLike
 
 import numpy as np
 
-from pkmcal.arguments import flag
-from pkmcal.arguments import path as as_path
 from pkmcal.arrays import FloatArray
 from pkmcal.controllers import robot_files
 from pkmcal.controllers.gcode_words import SAME
 from pkmcal.controllers.laws import require_plain_limbs
 from pkmcal.controllers.loss import Loss, fitted, require_held
+from pkmcal.controllers.own_file import Wanted, write_for
 from pkmcal.controllers.robot_files import About
 from pkmcal.exceptions import ArgumentError, FileError
-from pkmcal.files.atomic import write_whole
 from pkmcal.files.text_lines import text_in
 from pkmcal.files.toml_table import LARGEST
 from pkmcal.kinematics.robot import Robot, require_parallel
@@ -91,7 +90,11 @@ def maslow(
       MaslowKinematics:
         tlX: 0.000000
     """
-    path, project = as_path("path", path), flag("project", project)
+    return write_for(path, project, config, text_in, partial(_made, robot))
+
+
+def _made(robot: Robot, wanted: Wanted, there: str | None) -> tuple[str, Loss]:
+    """The eight lines, or the machine's file with the changed anchors."""
     require_parallel(robot)
     corner = _corners(robot)
     built = (robot.slots[:, 0:2] - robot.slots[:, 3:5])[corner]
@@ -101,15 +104,12 @@ def maslow(
         lambda x: as_robot(x.reshape(4, 2)), built.ravel(), q, poses, "between the anchors"
     )
     lacks = "the firmware has anchors alone, no offset and no gain of a belt as this robot has"
-    require_held(robot, lost, project, lacks)
+    require_held(robot, lost, wanted.project, lacks)
     values = dict(zip(_NAMES, (anchors + 0.0).tolist(), strict=True))
-    if config is None:
-        numbers = "".join(f"    {name}: {value:.6f}\n" for name, value in values.items())
-        text = "kinematics:\n  MaslowKinematics:\n" + numbers
-    else:
-        text = _changed(text_in(config), str(as_path("config", config)), values)
-    write_whole(path, text)
-    return lost
+    if there is not None:
+        return _changed(there, wanted.place, values), lost
+    numbers = "".join(f"    {name}: {value:.6f}\n" for name, value in values.items())
+    return "kinematics:\n  MaslowKinematics:\n" + numbers, lost
 
 
 def of_text(text: str, place: str) -> tuple[FloatArray, FloatArray]:

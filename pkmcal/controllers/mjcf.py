@@ -16,6 +16,7 @@ from pkmcal.controllers.loss import Loss, sag
 from pkmcal.core.library import POSE
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.atomic import write_whole
+from pkmcal.geometry.drivers import Driver
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.model import CHAIN
 from pkmcal.kinematics.robot import Robot, require_parallel
@@ -150,7 +151,7 @@ def _platform(world: Xml.Element, map: str, home: FloatArray) -> None:
 def _limb(
     world: Xml.Element,
     i: int,
-    driver: str,
+    driver: Driver,
     g: FloatArray,
     drive: float,
     along: FloatArray,
@@ -160,12 +161,12 @@ def _limb(
     """Add a limb to the model in its home pose; how far its tip is along its last body's z, mm."""
     base, rod, name = g[:3], float(g[8]), f"q{i + 1}"
     first, second = moves
-    if driver == "length":
+    if not driver.carries:
         leg = _swinging(world, f"leg{i + 1}", base, along, normal)
         tip = _body(leg, f"limb{i + 1}", np.array([0.0, 0.0, drive]), None)
         _joint(tip, name, "slide", np.array([0.0, 0.0, 1.0]), drive * _METRE)
         return 0.0
-    if driver == "slider":
+    if driver.slides:
         carriage = _body(world, f"carriage{i + 1}", base + drive * first, None)
         _joint(carriage, name, "slide", first, drive * _METRE)
         _swinging(carriage, f"limb{i + 1}", np.zeros(3), along, np.zeros(3))

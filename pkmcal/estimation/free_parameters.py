@@ -81,18 +81,13 @@ def parameters(
         raise ArgumentError("free: name at least one parameter, nothing else is unknown")
     _refuse_twice(names)
     units = tuple(str(every[j]) for j in number_of)
-    of_unit = unit_scales(robot, [data.measured for data in datasets])
     of_number = [np.full(len(places), np.nan)]  # where the unit says the scale
     of_number += [
         np.full(len(each.names), np.nan) if each.scale is None else each.scale
         for each in beside.values()
     ]
-    scale = np.concatenate(of_number)[number_of]
-    for i in np.flatnonzero(np.isnan(scale)):
-        scale[i] = _scale(of_unit, names[i], units[i])
-    if like is not None:
-        known = dict(zip(like.names, like.scale.tolist(), strict=True))
-        scale = np.array([known.get(n, own) for n, own in zip(names, scale.tolist(), strict=True)])
+    of_unit = unit_scales(robot, [data.measured for data in datasets])
+    scale = _scales(np.concatenate(of_number)[number_of], of_unit, names, units, like)
     starts = [geometry.values[places], *(each.start for each in beside.values())]
     values = np.concatenate(starts)[number_of]
     count = int(np.count_nonzero(number_of < len(places)))
@@ -140,6 +135,22 @@ def _refuse_twice(names: Sequence[str]) -> None:
                 f"{name}: {several} different parameters have this name; a reading or an effect"
                 " has to give its numbers names that no others have"
             )
+
+
+def _scales(
+    scale: FloatArray,
+    of_unit: Mapping[str, float],
+    names: Sequence[str],
+    units: Sequence[str],
+    like: Parameters | None,
+) -> FloatArray:
+    """Complete scales (n,) by those of units where they are NaN; those of `like` come first."""
+    for i in np.flatnonzero(np.isnan(scale)).tolist():
+        scale[i] = _scale(of_unit, names[i], units[i])
+    if like is None:
+        return scale
+    known = dict(zip(like.names, like.scale.tolist(), strict=True))
+    return np.array([known.get(n, own) for n, own in zip(names, scale.tolist(), strict=True)])
 
 
 def _scale(of_unit: Mapping[str, float], name: str, unit: str) -> float:

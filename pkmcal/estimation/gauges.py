@@ -102,7 +102,7 @@ def _motions(robot: Robot) -> FloatArray:
             change[i][[SLOTS.index(name) for name in AXES[axis]], columns + 3 : columns + 6] = (
                 tilts[:2]
             )
-            if axis == "base" and KINDS[limb.kind].driver == "crank":
+            if axis == "base" and KINDS[limb.kind].driver.turns:
                 change[i, _OFFSET, 3:6] = tilts[2]
     if all(KINDS[limb.kind].actuator_unit == "mm" for limb in limbs):
         lengths = [*_SCALED, *range(len(SLOTS), robot.model.own_width)]

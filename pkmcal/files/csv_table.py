@@ -143,6 +143,18 @@ class Table:
                 f"{self.path}: {len(names)} columns and {len(text.rows) - 1} rows; at most"
                 f" {MOST_COLUMNS} columns and {MOST_CELLS} cells are read"
             )
+        rows = self._rows_below(header, packed, text.separator)
+        self.lines = [line for line, _ in rows]
+        self._decimals = decimals(cells for _, cells in rows) if self._comma else {}
+        self.columns: dict[str, Column] = {}
+        for i, heading in enumerate(names):
+            self._add(i, heading, tuple(cells[i] for _, cells in rows))
+
+    def _rows_below(
+        self, header: Header, packed: bool, separator: str
+    ) -> list[tuple[int, list[str]]]:
+        """The rows of the table with their lines, each as wide as the header."""
+        names = header.headings
         rows = [(line, cells) for line, cells in header.rows if any(cells)]
         again = [line for line, cells in rows if _fitted(cells, names, packed) == names]
         if again and header.line:
@@ -160,17 +172,13 @@ class Table:
         for line, cells in rows:
             if len(cells) != width:
                 hint = ""
-                if text.separator == "," and len(cells) > width and not packed:
+                if separator == "," and len(cells) > width and not packed:
                     hint = " (a decimal comma needs ';' or tabs between columns)"
                 found = f"{len(cells)} cell{'s' * (len(cells) != 1)}"
                 raise FileError(
                     f"{self.path}, line {line}: {found} under {width} column names{hint}"
                 )
-        self.lines = [line for line, _ in rows]
-        self._decimals = decimals(cells for _, cells in rows) if self._comma else {}
-        self.columns: dict[str, Column] = {}
-        for i, heading in enumerate(names):
-            self._add(i, heading, tuple(cells[i] for _, cells in rows))
+        return rows
 
     def __len__(self) -> int:
         return len(self.lines)

@@ -11,10 +11,8 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from pkmcal.arrays import Unit
-from pkmcal.core.library import AXES, DRIVERS, ROWS, SLOTS
-from pkmcal.core.pulleys import BENT
-
-Driver = Literal["length", "slider", "crank", "pulley", "tackle"]
+from pkmcal.core.library import AXES, ROWS, SLOTS
+from pkmcal.geometry.drivers import CRANK, LENGTH, PULLEY, SLIDER, TACKLE, Driver
 
 POINT_SLOTS = SLOTS[:6]
 
@@ -27,9 +25,8 @@ class LimbKind:
     ----------
     name : str
         The name of the kind.
-    driver : {"length", "slider", "crank", "pulley", "tackle"}
-        How the actuator moves the limb; a crank's coordinate is an angle. Of a pulley and a tackle
-        the core knows limbs between two points that stand for it (`pkmcal.core.pulleys`).
+    driver : Driver
+        How the actuator moves the limb.
     what : str
         What the limb is, in a few words.
     axes : mapping of str to str
@@ -53,12 +50,12 @@ class LimbKind:
     cable: bool = False
 
     def __post_init__(self) -> None:
-        unknown = {self.driver, *self.axes, *self.rows} - {*DRIVERS, *BENT, *AXES, *ROWS}
+        unknown = {*self.axes, *self.rows} - {*AXES, *ROWS}
         if unknown:
             raise ValueError(f"{self.name}: the core has no {', '.join(sorted(unknown))}")
         for couple in {False, self.couple}:
             used = {axis for row in self.all_rows(couple) for axis in ROWS[row]}
-            used |= set() if self.driver in ("length", "tackle") else {"base"}
+            used |= {"base"} if self.driver.has_base_axis else set()
             if used != set(self.axes_of(couple)):
                 raise ValueError(
                     f"{self.name}: its driver and rows have the axes {sorted(used)}, "
@@ -68,34 +65,7 @@ class LimbKind:
     @property
     def actuator_unit(self) -> Unit:
         """Unit of the actuator coordinate and of the offset."""
-        return "rad" if self.driver == "crank" else "mm"
-
-    @property
-    def lengths(self) -> Mapping[str, str]:
-        """Keys of the fixed lengths of the limb, and the slots they are in."""
-        of_drivers: dict[Driver, dict[str, str]] = {
-            "length": {},
-            "slider": {"rod": "rod"},
-            "crank": {"rod": "rod", "crank": "crank"},
-            "pulley": {"radius": "crank"},  # what turns about the base point, as a crank does
-            "tackle": {},
-        }
-        return of_drivers[self.driver]
-
-    @property
-    def has_branch(self) -> bool:
-        """True if the inverse has two branches to choose from."""
-        return self.driver in ("slider", "crank")
-
-    @property
-    def has_zero(self) -> bool:
-        """True if the direction in which an angle about the base axis is 0 can be stated."""
-        return self.driver in ("crank", "pulley")
-
-    @property
-    def has_points(self) -> bool:
-        """True if the cable runs over several points of the base, with whole numbers of parts."""
-        return self.driver == "tackle"
+        return self.driver.unit
 
     def axes_of(self, couple: bool) -> dict[str, str]:
         """The axes of a limb with or without a couple length, in the order of the core."""
@@ -111,17 +81,17 @@ class LimbKind:
         axes = self.axes.values()
         return (
             ("kind", "base", "platform", "offset", "gain", "actuator")
-            + (("over", "parts") if self.has_points else ())
-            + tuple(self.lengths)
+            + (("over", "parts") if self.driver.points else ())
+            + tuple(self.driver.lengths)
             + tuple(axes)
             + tuple(f"{axis}_tilt" for axis in axes)
-            + (("zero",) if self.has_zero else ())
-            + (("branch",) if self.has_branch else ())
+            + (("zero",) if self.driver.has_zero else ())
+            + (("branch",) if self.driver.carries else ())
             + (("couple",) if self.couple else ())
             + (("weights",) if self.rows or self.couple else ())
             + ("drive", "stroke", "base_cone", "platform_cone")
             + (() if self.cable else ("stiffness", "mass"))
-            + (("rod_stiffness", "anchor_mass") if self.has_branch else ())
+            + (("rod_stiffness", "anchor_mass") if self.driver.carries else ())
         )
 
     def numbers(self, limb: int | Literal[""], couple: bool) -> tuple[tuple[str, str, Unit], ...]:
@@ -134,7 +104,7 @@ class LimbKind:
         }
         found["offset"] = (f"offset{limb}", self.actuator_unit)
         found["gain"] = (f"gain{limb}", "1")
-        for key, slot in self.lengths.items():
+        for key, slot in self.driver.lengths.items():
             found[slot] = (f"{key}{limb}", "mm")
         for axis, key in self.axes_of(couple).items():
             for i, slot in enumerate(AXES[axis], 1):
@@ -145,10 +115,10 @@ class LimbKind:
 KINDS: dict[str, LimbKind] = {
     kind.name: kind
     for kind in (
-        LimbKind("UPS", "length", "a leg of variable length"),
+        LimbKind("UPS", LENGTH, "a leg of variable length"),
         LimbKind(
             "UPR",
-            "length",
+            LENGTH,
             "a leg of variable length that keeps to a plane of the platform",
             axes={"base": "universal", "platform": "revolute"},
             rows=("platform_plane",),
@@ -156,29 +126,29 @@ KINDS: dict[str, LimbKind] = {
         ),
         LimbKind(
             "RPS",
-            "length",
+            LENGTH,
             "a leg of variable length that keeps to a plane of the base",
             axes={"base": "normal"},
             rows=("base_plane",),
         ),
-        LimbKind("PUS", "slider", "a carriage and a rod", axes={"base": "slider"}),
+        LimbKind("PUS", SLIDER, "a carriage and a rod", axes={"base": "slider"}),
         LimbKind(
             "PRS",
-            "slider",
+            SLIDER,
             "a carriage and a rod that keeps to a plane of the carriage",
             axes={"base": "slider", "hinge": "normal"},
             rows=("hinge_plane",),
         ),
-        LimbKind("cable", "length", "a cable or belt from point to point, taut", cable=True),
+        LimbKind("cable", LENGTH, "a cable or belt from point to point, taut", cable=True),
         LimbKind(
             "pulley",
-            "pulley",
+            PULLEY,
             "a cable over a swivelling pulley, taut",
             axes={"base": "swivel"},
             cable=True,
         ),
-        LimbKind("tackle", "tackle", "a cable over several points, taut", cable=True),
-        LimbKind("RUS", "crank", "a crank and a rod", axes={"base": "axis"}),
+        LimbKind("tackle", TACKLE, "a cable over several points, taut", cable=True),
+        LimbKind("RUS", CRANK, "a crank and a rod", axes={"base": "axis"}),
     )
 }
 

@@ -11,11 +11,11 @@ import numpy as np
 from pkmcal.arrays import FloatArray, Unit
 from pkmcal.core.laws import Drive, Laws
 from pkmcal.core.library import SLOTS
-from pkmcal.core.pulleys import BENT
 from pkmcal.display import Table, fixed
 from pkmcal.geometry.box import Box
 from pkmcal.geometry.chains import Chains
 from pkmcal.geometry.controller import Controller
+from pkmcal.geometry.drivers import Driver
 from pkmcal.geometry.elastic import Elastic, is_elastic
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.laws import Law, drive
@@ -92,6 +92,11 @@ class Limb:
     parts: tuple[int, ...] = ()
 
     @property
+    def driver(self) -> Driver | None:
+        """Driver of its kind; None of a chain, whose joints say how it is moved."""
+        return None if self.kind == CHAIN else KINDS[self.kind].driver
+
+    @property
     def frame(self) -> FloatArray:
         """Frame of the base axis; the identity where unused."""
         return self.frames.get("base", np.eye(3))
@@ -106,7 +111,7 @@ class Limb:
         kind = KINDS[self.kind]
         rows = kind.all_rows(self.couple > 0)
         return {
-            "driver": kind.driver,
+            "driver": kind.driver.name,
             "rows": rows,
             "actuator": self.actuator,
             "branch": self.branch,
@@ -266,13 +271,12 @@ class Model:
     @property
     def pulleys(self) -> tuple[int, ...]:
         """Limbs, counted from 0, that run over a pulley."""
-        return tuple(i for i, limb in enumerate(self.limbs) if limb.kind == "pulley")
+        return tuple(i for i, limb in enumerate(self.limbs) if limb.driver and limb.driver.swivels)
 
     @property
     def bent(self) -> tuple[int, ...]:
         """Limbs, counted from 0, that run over a pulley or over several points."""
-        kinds = [KINDS.get(limb.kind) for limb in self.limbs]  # a chain of joints has none
-        return tuple(i for i, kind in enumerate(kinds) if kind is not None and kind.driver in BENT)
+        return tuple(i for i, limb in enumerate(self.limbs) if limb.driver and limb.driver.bent)
 
     def doubts(self) -> list[tuple[int, str]]:
         """Drive laws without an inverse over their stroke: limbs, counted from 0, and why."""

@@ -29,22 +29,7 @@ def check(tables: Sequence[Table], chains: Chains) -> None:
     `tables` are those of each limb.
     """
     last = tables[-1]
-    if chains.n_actuators < 1:
-        last.fail("joints", "no joint has an actuator")
-    used = {joint.actuator for limb in chains.limbs for joint in limb if joint.actuator is not None}
-    first: dict[int, Joint] = {}
-    for limb in chains.limbs:
-        for joint in limb:
-            if joint.actuator is not None:
-                one = first.setdefault(joint.actuator, joint)
-                _check_alike(last, joint.actuator + 1, one, joint)
-    for a in range(chains.n_actuators):
-        if a not in used:
-            last.fail(
-                "joints", f"found {chains.n_actuators} actuators, but no joint has actuator {a + 1}"
-            )
-    if chains.n_actuators > MAX_LIMBS:
-        last.fail("joints", f"a machine has at most {MAX_LIMBS} actuators")
+    _check_actuators(last, chains)
     if len(chains.parts) > MAX_JOINTS or chains.count > MAX_NUMBERS:
         last.fail("joints", f"a machine has at most {MAX_JOINTS} axes, found {len(chains.parts)}")
     layout = chains.layout
@@ -74,6 +59,24 @@ def check(tables: Sequence[Table], chains: Chains) -> None:
             f"{n} actuator{'s' * (n > 1)}, {n + need - layout.rows} ways to move: the limbs leave"
             f" {layout.rows} closures for {need} unknowns with the actuators held",
         )
+
+
+def _check_actuators(last: Table, chains: Chains) -> None:
+    """Refuse actuators that no joint has, and joints of one actuator that differ."""
+    if chains.n_actuators < 1:
+        last.fail("joints", "no joint has an actuator")
+    first: dict[int, Joint] = {}
+    for joint in (joint for limb in chains.limbs for joint in limb):
+        if joint.actuator is not None:
+            one = first.setdefault(joint.actuator, joint)
+            _check_alike(last, joint.actuator + 1, one, joint)
+    for a in range(chains.n_actuators):
+        if a not in first:
+            last.fail(
+                "joints", f"found {chains.n_actuators} actuators, but no joint has actuator {a + 1}"
+            )
+    if chains.n_actuators > MAX_LIMBS:
+        last.fail("joints", f"a machine has at most {MAX_LIMBS} actuators")
 
 
 def _fail_dependent(table: Table, chains: Chains, i: int) -> NoReturn:

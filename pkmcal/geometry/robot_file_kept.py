@@ -115,7 +115,7 @@ class _Edit:
             self._list(table["over"], j - 1, [numbers.get(f"over{j}.{axis}") for axis in "xyz"])
         for axis, name in kind.axes_of(limb.couple > 0.0).items():
             self._list(table, f"{name}_tilt", [numbers.get(slot) for slot in AXES[axis]])
-        for key, slot in {**kind.lengths, "offset": "offset", "gain": "gain"}.items():
+        for key, slot in {**kind.driver.lengths, "offset": "offset", "gain": "gain"}.items():
             if slot in numbers and self._concerns(name := numbers[slot].name):
                 self._put(table, key, self._written(name), [name])
         if limb.law is not None:

@@ -14,7 +14,6 @@ import numpy as np
 from pkmcal.arrays import FloatArray
 from pkmcal.core.library import AXES, MAPS, SLOTS
 from pkmcal.core.machine import Machine
-from pkmcal.core.pulleys import BENT
 from pkmcal.files.toml_table import Table
 from pkmcal.geometry.chain_joints import Joint, across
 from pkmcal.geometry.limb_kinds import KINDS
@@ -23,8 +22,7 @@ from pkmcal.geometry.robot_file_limbs import Entry, Parameters, read_limb
 from pkmcal.screw import from_pose
 
 _OFF = 1e-6  # of its length: what a limb may miss at home, and a direction in the plane
-_DRIVERS = ("length", "slider", "crank")  # and rows that joints are known for
-_ROWS = ("base_plane", "platform_plane", "couple", "hinge_plane")
+_ROWS = ("base_plane", "platform_plane", "couple", "hinge_plane")  # that joints are known for
 _Z = np.array([0.0, 0.0, 1.0])
 
 
@@ -45,7 +43,8 @@ def joints_of_kind(
 
     `home` is the platform's pose (6,). Names under ``[parameters]`` stand for their values.
     """
-    if (name := table.data.get("kind")) in BENT:
+    named = KINDS.get(name) if isinstance(name := table.data.get("kind"), str) else None
+    if named is not None and named.driver.bent:
         table.fail("kind", f"what a {name} takes up is no joint: it does not go beside chains")
     limb, entries, of_law = read_limb(table, table.integer("actuator", 1) - 1, parameters)
     if "actuator" not in table:
@@ -55,7 +54,7 @@ def joints_of_kind(
     parameters.constants.update(parameters.units)
     kind, number = KINDS[limb.kind], limb.actuator + 1
     beside = set(kind.all_rows(limb.couple > 0.0))
-    known = kind.driver in _DRIVERS and beside <= set(_ROWS)
+    known = kind.driver.jointed and beside <= set(_ROWS)
     if map == "spherical" or not known or (map == "planar" and beside):
         table.fail("kind", f"with the map {map}, list the joints of a limb {limb.kind} as a chain")
     at = _at_home(table, limb, entries, home)
@@ -87,7 +86,7 @@ def _at_home(table: Table, limb: Limb, entries: dict[str, Entry], home: FloatArr
     T = from_pose(home)
     tip = T[:3, :3] @ numbers[3:6] + T[:3, 3]
     kind = KINDS[limb.kind]
-    length = float(drive[0, 0]) if kind.driver == "length" else value["rod"]
+    length = float(drive[0, 0]) if not kind.driver.carries else value["rod"]
     worst = float(np.abs(missed).max())
     if worst > _OFF * max(length, limb.couple):
         table.fail(
@@ -102,20 +101,20 @@ def _at_home(table: Table, limb: Limb, entries: dict[str, Entry], home: FloatArr
         axes[axis] = (limb.frames[axis] @ tilted)[:, 2]
         if axis == "platform":
             axes[axis] = T[:3, :3] @ axes[axis]
-    anchor = base if kind.driver == "length" else tip - length * along[0, 0]
+    anchor = base if not kind.driver.carries else tip - length * along[0, 0]
     return _Home(base, anchor, tip, float(drive[0, 0]), axes)
 
 
 def _check_plane(table: Table, limb: Limb, at: _Home) -> None:
     """Check that limbs of a plane machine move in it: chains know nothing beside it."""
     driver = KINDS[limb.kind].driver
-    if driver == "crank":
+    if driver.turns:
         out = float(np.linalg.norm(at.axes["base"][:2]))
         key, what = "axis", "must be along z"
     else:
-        way = at.axes["base"] if driver == "slider" else at.tip - at.base
+        way = at.axes["base"] if driver.slides else at.tip - at.base
         out = abs(float(way[2])) / float(np.linalg.norm(way))
-        key, what = ("slider", "must be") if driver == "slider" else ("", "its joints must be")
+        key, what = ("slider", "must be") if driver.slides else ("", "its joints must be")
         what += " at right angles to z"
     if out > _OFF:
         table.fail(key, f"{what}: with the map planar, beside chains, limbs move in the plane")
@@ -124,8 +123,8 @@ def _check_plane(table: Table, limb: Limb, at: _Home) -> None:
 def _joints(limb: Limb, at: _Home, beside: set[str], map: str) -> tuple[Joint, ...]:
     driver = KINDS[limb.kind].driver
     way = (at.tip - at.anchor) / np.linalg.norm(at.tip - at.anchor)
-    slides = driver != "crank"
-    along = way if driver == "length" else at.axes["base"]
+    slides = not driver.turns
+    along = at.axes["base"] if driver.carries else way
     actuated = Joint(
         "P" if slides else "R",
         at.base,
@@ -149,7 +148,7 @@ def _joints(limb: Limb, at: _Home, beside: set[str], map: str) -> tuple[Joint, .
             swings = Joint("S", at.anchor, ())
         if "platform_plane" in beside:
             last = Joint("R", at.tip, (at.axes["platform"],))
-    before = (swings, actuated) if driver == "length" else (actuated, swings)
+    before = (actuated, swings) if driver.carries else (swings, actuated)
     return (*before, last)
 
 
@@ -165,7 +164,7 @@ def _with_cones(
     ):
         if cone is None:
             continue
-        on_crank = key == "base_cone" and KINDS[limb.kind].driver == "crank"
+        on_crank = key == "base_cone" and KINDS[limb.kind].driver.turns
         if joints[k].kind not in "US" or on_crank:
             table.fail(key, f"list the joints of this limb as a chain: its {joints[k].kind} has it")
         found[k] = _with_cone(joints[k], cone, np.eye(3) if key == "base_cone" else turned)

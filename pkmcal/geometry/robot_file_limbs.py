@@ -181,13 +181,13 @@ def read_limb(
         for key in (kind.axes[axis], f"{kind.axes[axis]}_tilt"):
             if key in table:
                 table.fail(key, "only a limb with a couple length has this")
-    zero = "zero" if kind.driver == "crank" or (kind.has_zero and "zero" in table) else None
+    zero = "zero" if kind.driver.needs_zero or (kind.driver.has_zero and "zero" in table) else None
     frames = {
         axis: _frame(table, key, zero if axis == "base" else None) for axis, key in axes.items()
     }
 
-    branch = table.integer("branch") if kind.has_branch else 0
-    if kind.has_branch and branch not in (1, -1):
+    branch = table.integer("branch") if kind.driver.carries else 0
+    if kind.driver.carries and branch not in (1, -1):
         table.fail("branch", f"must be 1 or -1, found {branch}")
     actuator = table.integer("actuator", i + 1)
     if actuator < 1:
@@ -203,7 +203,7 @@ def read_limb(
         base_cone=_cone(table, "base_cone"),
         platform_cone=_cone(table, "platform_cone"),
         law=law,
-        parts=_parts(table) if kind.has_points else (),
+        parts=_parts(table) if kind.driver.points else (),
     )
     for array in frames.values():
         array.flags.writeable = False
@@ -220,7 +220,7 @@ def _read_numbers(
     for point in ("base", "platform"):
         for coordinate, found in zip("xyz", _point(table, point, parameters), strict=True):
             entries[f"{point}.{coordinate}"] = found
-    if kind.has_points:
+    if kind.driver.points:
         for j, place in enumerate(_over(table), 1):
             for axis, value in zip("xyz", place, strict=True):
                 entries[f"over{j}.{axis}"] = entry("over", value, "mm")
@@ -229,7 +229,7 @@ def _read_numbers(
     entries["gain"] = entry("gain", table.data.get("gain", 1.0), of_gain)
     if entries["gain"].value == 0.0:
         table.fail("gain", "must not be 0: the actuator would not move the limb")
-    for key, slot in kind.lengths.items():
+    for key, slot in kind.driver.lengths.items():
         entries[slot] = entry(key, table[key], "mm")
         _positive(table, key, entries[slot].value)
     for axis, name in kind.axes_of(couple).items():

@@ -120,9 +120,9 @@ def _limb(limb: Limb, i: int, geometry: Geometry) -> dict[str, Any]:
     for axis, key in kind.axes_of(couple).items():
         data[key] = limb.frames[axis][:, 2].tolist()
         data[f"{key}_tilt"] = [entry(slot) for slot in AXES[axis]]
-    if kind.has_zero:
+    if kind.driver.has_zero:
         data["zero"] = limb.frame[:, 0].tolist()
-    named = {**kind.lengths, "offset": "offset", "gain": "gain"}
+    named = {**kind.driver.lengths, "offset": "offset", "gain": "gain"}
     data.update({key: entry(slot) for key, slot in named.items()})
     if limb.law is not None:
         unit = kind.actuator_unit
@@ -131,7 +131,7 @@ def _limb(limb: Limb, i: int, geometry: Geometry) -> dict[str, Any]:
         data["couple"] = limb.couple
     if limb.weights:
         data["weights"] = list(limb.weights)
-    if kind.has_branch:
+    if kind.driver.carries:
         data["branch"] = limb.branch
     if limb.stroke is not None:
         data["stroke"] = list(limb.stroke)

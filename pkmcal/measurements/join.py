@@ -95,19 +95,9 @@ def _put(
     said: str,
     logged: Sequence[Field],
 ) -> None:
-    kept = [i for i, row in enumerate(rows) if row is not None]
-    unmatched = [i for i, row in enumerate(rows) if row is None]
-    unused = len(log) - len({row for row in rows if row is not None})
-    if unmatched:
-        lines = ", ".join(str(table.lines[i]) for i in unmatched[:_LISTED])
-        more = ", …" if len(unmatched) > _LISTED else ""
-        said += (
-            f"; {len(unmatched)} of {len(rows)} points without a row left out: lines {lines}{more}"
-        )
-    if unused:
-        said += f"; {unused} of its {len(log)} rows not used"
-    table.take(kept)
     chosen = [row for row in rows if row is not None]
+    said += _left_out(table, log, rows)
+    table.take([i for i, row in enumerate(rows) if row is not None])
     for field in logged:
         own = [name for name in table.columns if _is_of(name, field)]
         if field.log_first and own and any(_is_of(name, field) for name in log.columns):
@@ -126,6 +116,20 @@ def _put(
     table.notes.append(said)
     log.leave_out([name for name in log.columns if name not in (*actuators, *of_fields)])
     table.take_over(log)
+
+
+def _left_out(table: Table, log: Table, rows: Rows) -> str:
+    """Say how many points have no row of the log, and how many of its rows no point."""
+    said = ""
+    unmatched = [i for i, row in enumerate(rows) if row is None]
+    if unmatched:
+        lines = ", ".join(str(table.lines[i]) for i in unmatched[:_LISTED])
+        more = ", …" if len(unmatched) > _LISTED else ""
+        said += (
+            f"; {len(unmatched)} of {len(rows)} points without a row left out: lines {lines}{more}"
+        )
+    unused = len(log) - len({row for row in rows if row is not None})
+    return f"{said}; {unused} of its {len(log)} rows not used" if unused else said
 
 
 def _is_of(name: str, field: Field) -> bool:

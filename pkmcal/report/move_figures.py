@@ -12,7 +12,6 @@ from pkmcal import display, screw
 from pkmcal.arrays import FloatArray, as_rows
 from pkmcal.core.library import SLOTS
 from pkmcal.geometry.limb_kinds import KINDS
-from pkmcal.geometry.model import CHAIN
 from pkmcal.kinematics.robot import Robot
 from pkmcal.report.drawing import BLUE, FAINT, ORANGE, empty_figure, in_context
 
@@ -93,13 +92,11 @@ def in_space(robot: Robot, poses: ArrayLike, labels: Sequence[str], title: str) 
     for k, label in enumerate(labels):
         panel = figure.add_subplot(1, len(rows), k + 1, projection="3d")
         for i, limb in enumerate(robot.model.limbs):
-            if limb.kind == CHAIN:
-                panel.plot(*np.array([base[i], anchors[k, i]]).T, color=FAINT, lw=3)
-            elif KINDS[limb.kind].driver == "slider":
+            if limb.driver is not None and limb.driver.slides:
                 way = (anchors[:, i] - base[i]) @ (anchors[0, i] - base[i])
                 rail = anchors[[way.argmin(), way.argmax()], i]
                 panel.plot(*rail.T, color="0.75", lw=3, solid_capstyle="butt")
-            elif KINDS[limb.kind].driver == "crank":
+            elif limb.driver is None or limb.driver.turns:
                 panel.plot(*np.array([base[i], anchors[k, i]]).T, color=FAINT, lw=3)
             panel.plot(*np.array([anchors[k, i], joints[k, i]]).T, color=BLUE, lw=1.6)
             panel.text(*anchors[k, i], f" {i + 1}", fontsize=8)
@@ -130,7 +127,7 @@ def places(robot: Robot, own: FloatArray) -> tuple[FloatArray, FloatArray, Float
     platform = np.column_stack([slots[:, 3:6], np.ones(len(slots))])
     joints = (screw.from_pose(own) @ platform.T).transpose(0, 2, 1)[..., :3]
     rods = slots[:, SLOTS.index("rod")]
-    carried = np.array([KINDS[limb.kind].has_branch for limb in robot.model.limbs])
+    carried = np.array([KINDS[limb.kind].driver.carries for limb in robot.model.limbs])
     ends = np.where(carried[:, None], joints - rods[:, None] * direction, slots[:, 0:3])
     return slots[:, 0:3], ends, joints
 

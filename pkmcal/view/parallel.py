@@ -117,15 +117,15 @@ def _limbs(robot: Robot, moves: FloatArray) -> list[dict[str, Any]]:
     made = []
     for i, limb in enumerate(robot.model.limbs):
         driver = KINDS[limb.kind].driver
-        along = {"length": slice(0), "slider": slice(None, None, _TRACK - 1), "crank": slice(None)}
+        along = slice(None, None, _TRACK - 1) if driver.slides else slice(None)
         made.append(
             {
                 "kind": limb.kind,
-                "driver": driver,
+                "driver": driver.name,
                 "actuator": limb.actuator,
                 "base": robot.slots[i, :3].tolist(),
-                "axis": limb.frame[:, 2].tolist() if driver == "crank" else None,
-                "track": way[along[driver], i, 3:6].round(3).tolist(),
+                "axis": limb.frame[:, 2].tolist() if driver.turns else None,
+                "track": way[along if driver.carries else slice(0), i, 3:6].round(3).tolist(),
                 "stroke": limb.stroke,
                 "base_cone": _cone(limb.base_cone),
                 "platform_cone": _cone(limb.platform_cone),

@@ -66,7 +66,7 @@ def skeleton(robot: Robot | SerialArm, q: FloatArray, guess: FloatArray) -> Skel
     for i, limb in enumerate(robot.model.limbs):
         kind = KINDS[limb.kind]
         line = [base[i], ends[i]]
-        if kind.has_branch:  # the joint that the slider or crank carries
+        if kind.driver.carries:  # the joint that the slider or crank carries
             rod = robot.geometry[f"rod{i + 1}"]
             line.insert(1, ends[i] - rod * towards[0, i])
         lines.append(np.array(line))

@@ -46,20 +46,7 @@ def run(text: str, start: dict[str, float], home: dict[str, float], version: int
             if version == 0 and line[0] == "(":
                 it.other(line)  # since 2024 what stands before the command is part of it
                 continue
-            targets = {}
-            for axis in "XYZ":
-                if axis in words:
-                    value = float(words[axis])
-                    targets[axis] = it.at[axis] + value if not absolute else value + it.shift[axis]
-            if "F" in words:
-                it.feed = float(words["F"])
-            e = 0.0
-            if "E" in words:
-                value = float(words["E"])
-                e = value if not absolute or not absolute_e else value - it.extruder
-                it.extruder += e
-            if targets or e:
-                it.move(name, targets, e, None)
+            _move(it, name, words, absolute, absolute and absolute_e)
         elif name in ("G90", "G91"):
             absolute = name == "G90"
         elif name in ("M82", "M83"):
@@ -67,13 +54,7 @@ def run(text: str, start: dict[str, float], home: dict[str, float], version: int
         elif name == "G21":
             continue
         elif name == "G92":
-            for axis in "XYZ":
-                if axis in words:
-                    it.shift[axis] = it.at[axis] - float(words[axis])
-            if "E" in words:
-                it.extruder = float(words["E"])
-            if not set("XYZE") & set(words):
-                it.shift, it.extruder = dict(it.at), 0.0
+            _renamed(it, words)
         elif name == "G28":
             it.other(line)
             it.at = dict(home)
@@ -85,6 +66,36 @@ def run(text: str, start: dict[str, float], home: dict[str, float], version: int
             if not known and (pairs[0][0] not in "GM" or name in ("M18", "M84", "M600")):
                 it.hidden()  # a macro of the user
     return it
+
+
+def _move(
+    it: Controller, name: str, words: dict[str, str], absolute: bool, absolute_e: bool
+) -> None:
+    targets = {}
+    for axis in "XYZ":
+        if axis in words:
+            value = float(words[axis])
+            targets[axis] = it.at[axis] + value if not absolute else value + it.shift[axis]
+    if "F" in words:
+        it.feed = float(words["F"])
+    e = 0.0
+    if "E" in words:
+        value = float(words["E"])
+        e = value - it.extruder if absolute_e else value
+        it.extruder += e
+    if targets or e:
+        it.move(name, targets, e, None)
+
+
+def _renamed(it: Controller, words: dict[str, str]) -> None:
+    """G92: the place where it is gets other coordinates."""
+    for axis in "XYZ":
+        if axis in words:
+            it.shift[axis] = it.at[axis] - float(words[axis])
+    if "E" in words:
+        it.extruder = float(words["E"])
+    if not set("XYZE") & set(words):
+        it.shift, it.extruder = dict(it.at), 0.0
 
 
 def _taken_apart(line: str) -> list[tuple[str, str]]:

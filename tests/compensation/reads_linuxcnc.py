@@ -102,13 +102,7 @@ def _act(it: Controller, words: list[tuple[str, float]], state: dict, line: str)
     values = dict(others)
     if len(values) != len(others) or "E" in values:
         raise Odd("a letter twice, or E")
-    if ODD & set(g) or ODD_M & set(m):
-        raise Odd(str(g + m))
-    if len([each for each in g if each in (0, 1, 80)]) > 1:
-        raise Odd("two motions")
-    own = NON_MODAL & set(g)
-    if own and set(values) & set("XYZABC"):
-        raise Odd("axis words of a code that is no move")
+    _refuse_odd(g, m, values)
     for each in (93, 94, 95):
         if each in g:
             state["times"], state["turns"] = each == 93, each == 95
@@ -134,15 +128,7 @@ def _act(it: Controller, words: list[tuple[str, float]], state: dict, line: str)
         raise AssertionError("G1 in G93 without F")
     if 80 in g:
         state["motion"] = None
-    targets = {
-        axis: values[axis] * (25.4 if state["inch"] else 1.0) for axis in values if axis in "XYZ"
-    }
-    if targets and state["motion"] is None:
-        raise Odd("axis words without a motion")
-    if targets:
-        if state["relative"]:
-            targets = {axis: it.at[axis] + value for axis, value in targets.items()}
-        _move(it, targets, state, values)
+    _move(it, state, values)
     ends = [f"M{each:g}" for each in m if each in (0, 1, 2, 30, 60)]
     if ends:
         it.other(" ".join(ends))
@@ -152,7 +138,24 @@ def _act(it: Controller, words: list[tuple[str, float]], state: dict, line: str)
     return False
 
 
-def _move(it: Controller, targets: dict[str, float], state: dict, values: dict) -> None:
+def _refuse_odd(g: list[float], m: list[float], values: dict[str, float]) -> None:
+    if ODD & set(g) or ODD_M & set(m):
+        raise Odd(str(g + m))
+    if len([each for each in g if each in (0, 1, 80)]) > 1:
+        raise Odd("two motions")
+    if NON_MODAL & set(g) and set(values) & set("XYZABC"):
+        raise Odd("axis words of a code that is no move")
+
+
+def _move(it: Controller, state: dict, values: dict[str, float]) -> None:
+    inch = 25.4 if state["inch"] else 1.0
+    targets = {axis: values[axis] * inch for axis in values if axis in "XYZ"}
+    if not targets:
+        return
+    if state["motion"] is None:
+        raise Odd("axis words without a motion")
+    if state["relative"]:
+        targets = {axis: it.at[axis] + value for axis, value in targets.items()}
     did = f"G{state['motion']}"
     if did == "G0":
         it.move(did, targets, 0.0, 0.0)

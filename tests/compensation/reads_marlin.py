@@ -30,13 +30,9 @@ KNOWN = {
 def run(text: str, start: dict[str, float], home: dict[str, float], version: int) -> Controller:
     """Run a program in Marlin 1 or 2."""
     it = Controller(dict(start))
-    relative, e_relative, inch = dict.fromkeys("XYZ", False), False, 1.0
+    relative, e_relative, inch = False, False, 1.0
     for line in text.replace("\r\n", "\n").replace("\r", "\n").split("\n"):
-        line = line.partition(";")[0].lstrip("\ufeff").strip()
-        if line[:1] == "N" and line[1:2].isdigit():
-            line = line.partition(" ")[2].strip()
-        if "*" in line:
-            raise Odd("checksum")
+        line = _without_number(line.partition(";")[0].lstrip("\ufeff").strip())
         letter = line[:1]
         rest = line[1:].lstrip(" ")
         digits = rest[: len(rest) - len(rest.lstrip("0123456789"))]
@@ -56,47 +52,72 @@ def run(text: str, start: dict[str, float], home: dict[str, float], version: int
             it.other(line)
             it.hidden()
         elif name in ("G0", "G1"):
-            targets = {}
-            for axis in "XYZ":
-                if words.get(axis) is not None:
-                    value = words[axis] * inch
-                    targets[axis] = (
-                        it.at[axis] + value if relative[axis] else value + it.shift[axis]
-                    )
-            if words.get("F"):
-                it.feed = words["F"] * inch
-            e = 0.0
-            if words.get("E") is not None:
-                value = words["E"] * inch
-                counts = e_relative if version == 2 else (e_relative or relative["X"])
-                e = value if counts else value - it.extruder
-                it.extruder += e
-            if targets or e:
-                it.move(name, targets, e, None)
+            counts = e_relative if version == 2 else (e_relative or relative)
+            _move(it, name, words, inch, relative, counts)
         elif name in ("G20", "G21"):
             inch = 25.4 if name == "G20" else 1.0
         elif name in ("G90", "G91"):
-            relative = dict.fromkeys("XYZ", name == "G91")
+            relative = name == "G91"
             if version == 2:
                 e_relative = name == "G91"
         elif name in ("M82", "M83"):
             e_relative = name == "M83"
         elif name == "G92":
-            for axis in "XYZ":
-                if words.get(axis) is not None:
-                    it.shift[axis] = it.at[axis] - words[axis] * inch
-            if words.get("E") is not None:
-                it.extruder = words["E"] * inch
-        elif name == "G28":
-            it.other(line)
-            it.at = dict(home)
-        elif name in ODD:
-            raise Odd(name)
+            _renamed(it, words, inch)
         else:
-            it.other(line)
-            if name in ELSEWHERE or name not in KNOWN:
-                it.hidden()
+            _other(it, name, line, home)
     return it
+
+
+def _other(it: Controller, name: str, line: str, home: dict[str, float]) -> None:
+    if name in ODD:
+        raise Odd(name)
+    it.other(line)
+    if name == "G28":
+        it.at = dict(home)
+    elif name in ELSEWHERE or name not in KNOWN:
+        it.hidden()
+
+
+def _without_number(line: str) -> str:
+    if line[:1] == "N" and line[1:2].isdigit():
+        line = line.partition(" ")[2].strip()
+    if "*" in line:
+        raise Odd("checksum")
+    return line
+
+
+def _move(
+    it: Controller,
+    name: str,
+    words: dict[str, float | None],
+    inch: float,
+    relative: bool,
+    e_relative: bool,
+) -> None:
+    targets = {}
+    for axis in "XYZ":
+        if words.get(axis) is not None:
+            value = words[axis] * inch
+            targets[axis] = it.at[axis] + value if relative else value + it.shift[axis]
+    if words.get("F"):
+        it.feed = words["F"] * inch
+    e = 0.0
+    if words.get("E") is not None:
+        value = words["E"] * inch
+        e = value if e_relative else value - it.extruder
+        it.extruder += e
+    if targets or e:
+        it.move(name, targets, e, None)
+
+
+def _renamed(it: Controller, words: dict[str, float | None], inch: float) -> None:
+    """G92: the place where it is gets other coordinates."""
+    for axis in "XYZ":
+        if words.get(axis) is not None:
+            it.shift[axis] = it.at[axis] - words[axis] * inch
+    if words.get("E") is not None:
+        it.extruder = words["E"] * inch
 
 
 def _parameters(rest: str) -> dict[str, float | None]:

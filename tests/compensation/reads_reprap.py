@@ -116,29 +116,7 @@ def _act(it: Controller, command: str, state: dict, home: dict, version: int) ->
         it.hidden()
         state["macro"] = True
     elif name in ("G0", "G1"):
-        if rest[:1] == ".":
-            raise Odd("G1 with a fraction")
-        state["last"] = name
-        words = _words(rest)
-        if set("HRPS") & set(words):
-            raise Odd("a move of motors, to a stored point, or with outputs")
-        inch = 25.4 if state["inch"] else 1.0
-        targets = {}
-        for axis in "XYZ":
-            if axis in words:
-                value = words[axis] * inch
-                targets[axis] = it.at[axis] + value if state["relative"] else value + it.shift[axis]
-        it.feed = words["F"] * inch if "F" in words else it.feed
-        e = 0.0
-        if "E" in words:
-            value = words["E"] * inch
-            e = value if state["e_relative"] else value - it.extruder
-            if not state["e_relative"]:
-                it.extruder = value
-            elif version == 1:
-                it.extruder += value
-        if targets or e:
-            it.move(name, targets, e, None)
+        _move(it, name, rest, state, version)
     elif name in ("G20", "G21"):
         state["inch"] = name == "G20"
     elif name in ("G90", "G91"):
@@ -148,14 +126,7 @@ def _act(it: Controller, command: str, state: dict, home: dict, version: int) ->
     elif name in ("M82", "M83"):
         state["e_relative"] = name == "M83"
     elif name == "G92":
-        words = _words(rest)
-        for axis in "XYZ":
-            if axis in words:
-                it.shift[axis] = it.at[axis] - words[axis]
-        if "E" in words:  # as XYZ it is in the unit of the program, from firmware 2 on
-            it.extruder = words["E"] * (25.4 if state["inch"] else 1.0)
-        if not words:
-            raise Odd("G92 alone")
+        _renamed(it, _words(rest), state)
     elif name == "G28":
         it.other(command)
         it.at, state["macro"] = dict(home), True
@@ -169,6 +140,43 @@ def _act(it: Controller, command: str, state: dict, home: dict, version: int) ->
         if name in ELSEWHERE or name not in KNOWN or moved:
             it.hidden()
             state["macro"] = True
+
+
+def _move(it: Controller, name: str, rest: str, state: dict, version: int) -> None:
+    if rest[:1] == ".":
+        raise Odd("G1 with a fraction")
+    state["last"] = name
+    words = _words(rest)
+    if set("HRPS") & set(words):
+        raise Odd("a move of motors, to a stored point, or with outputs")
+    inch = 25.4 if state["inch"] else 1.0
+    targets = {}
+    for axis in "XYZ":
+        if axis in words:
+            value = words[axis] * inch
+            targets[axis] = it.at[axis] + value if state["relative"] else value + it.shift[axis]
+    it.feed = words["F"] * inch if "F" in words else it.feed
+    e = 0.0
+    if "E" in words:
+        value = words["E"] * inch
+        e = value if state["e_relative"] else value - it.extruder
+        if not state["e_relative"]:
+            it.extruder = value
+        elif version == 1:
+            it.extruder += value
+    if targets or e:
+        it.move(name, targets, e, None)
+
+
+def _renamed(it: Controller, words: dict[str, float], state: dict) -> None:
+    """G92: the place where it is gets other coordinates."""
+    for axis in "XYZ":
+        if axis in words:
+            it.shift[axis] = it.at[axis] - words[axis]
+    if "E" in words:  # as XYZ it is in the unit of the program, from firmware 2 on
+        it.extruder = words["E"] * (25.4 if state["inch"] else 1.0)
+    if not words:
+        raise Odd("G92 alone")
 
 
 def _words(rest: str) -> dict[str, float]:

@@ -61,7 +61,7 @@ def test_home_and_workspace_keep_every_limit(name: str) -> None:
     for limb, n in zip(robot.model.limbs, numbers, strict=True):
         low, high = limb.stroke or (-np.inf, np.inf)
         assert low < q[:, limb.actuator].min() and q[:, limb.actuator].max() < high
-        if KINDS[limb.kind].driver == "length" and limb.base_cone is not None:
+        if KINDS[limb.kind].driver.name == "length" and limb.base_cone is not None:
             legs = at[:, :3] + rotations @ twin.platform_point(n) - twin.base_point(n)
             cosines = legs @ limb.base_cone.axis / np.linalg.norm(legs, axis=1)
             assert np.arccos(cosines).max() < limb.base_cone.angle

@@ -3,7 +3,6 @@ import { app, attempt, button, change, choice, field, frame, made, work } from '
 import { save } from './transport.js'
 
 const STATEMENTS = ['machine', 'serial', 'customer', 'operator', 'date', 'instrument', 'temperature', 'method']
-const TARGETS = [['c', 'C header'], ['linuxcnc', 'LinuxCNC'], ['mjcf', 'MuJoCo'], ['fmu', 'FMU'], ['urdf', 'URDF (arms)'], ['dh', 'Denavit–Hartenberg table (arms)']]
 
 export async function out(main) {
   made('h1', main, { text: 'Take it away' })
@@ -40,7 +39,7 @@ export async function out(main) {
   }
   const extra = made('div', main, { className: 'settings' })
   const there = new Set(app.project.state.export?.as ?? [])
-  choice(extra, 'for another controller', [['', '…'], ...TARGETS.filter(([key]) => !there.has(key))], '', async target => {
+  choice(extra, 'for another controller', [['', '…'], ...found.targets.filter(([key]) => !there.has(key))], '', async target => {
     if (target && await change(table => { table.export = { as: [...there, target] } })) await app.screens.out((main.replaceChildren(), main))
   })
 }

@@ -1,0 +1,129 @@
+"""A target: something that robots are written for, with what it takes and what writes it."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from pkgutil import resolve_name
+from typing import TYPE_CHECKING, Any, Literal
+
+from pkmcal.arguments import shown, word
+from pkmcal.exceptions import ArgumentError, ArgumentTypeError
+
+if TYPE_CHECKING:
+    from pkmcal.controllers.loss import Loss
+
+Takes = Literal["parallel", "arm", "any"]
+OPTIONS = ("number", "config", "project")  # what the command line may be told beside the file
+
+
+@dataclass(frozen=True)
+class Target:
+    """Something that robots are written for: a controller, a simulator, a file format.
+
+    `register` makes it known to the command line, to projects and to the window.
+
+    Parameters
+    ----------
+    name : str
+        What ``--as`` calls it.
+    write : callable or str
+        Writes a machine: ``write(machine, path)``, and keywords ``number``, ``config`` and
+        ``project`` of the command line's options, those of them that it has. It returns the `Loss`
+        of what it wrote or anything else, and raises a ValueError where the target cannot hold the
+        machine. A text ``"package.module:function"`` is imported when it is needed.
+    about : str
+        What is written, a phrase of the help.
+    takes : {"parallel", "arm", "any"}
+        Which machines: parallel ones, serial arms, or both. An arm is handed over with its joint
+        errors and without the laws of its joints, of which the `Loss` is said.
+    label : str
+        What the window calls it; "" where it does not offer it.
+    file : str
+        Name of the file that the window writes; by default it contains the name.
+    folder : bool
+        Whether a folder is written.
+    said : str
+        Words before a loss where it is not that of what was written.
+
+    Examples
+    --------
+    >>> import pkmcal as pk
+    >>> def names(robot, path):
+    ...     path.write_text(" ".join(robot.geometry.names))
+    >>> pk.export.Target("names", names, "the names of its numbers").options
+    ()
+    >>> pk.export.targets()["klipper"].options
+    ('config', 'project')
+    """
+
+    name: str
+    write: Callable[..., Any] | str
+    about: str
+    takes: Takes = "parallel"
+    label: str = ""
+    file: str = ""
+    folder: bool = False
+    said: str = ""
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.name, str) or not self.name or self.name.split() != [self.name]:
+            raise ArgumentError(f"name must be one word, found {shown(self.name)}")
+        if not (callable(self.write) or isinstance(self.write, str)):
+            raise ArgumentTypeError(f"write must be a function, found {shown(self.write)}")
+        word("takes", self.takes, ("parallel", "arm", "any"))
+        if not self.file:
+            object.__setattr__(self, "file", f"for_{self.name}.txt")
+
+    @property
+    def writer(self) -> Callable[..., Any]:
+        """The function that writes."""
+        if callable(self.write):
+            return self.write
+        found: Callable[..., Any] = resolve_name(self.write)
+        return found
+
+    @property
+    def options(self) -> tuple[str, ...]:
+        """The options of the command line that its function has."""
+        known = inspect.signature(self.writer).parameters
+        return tuple(name for name in known if name in OPTIONS)
+
+    def export(
+        self, machine: Any, path: PathLike[str], options: Mapping[str, Any] | None = None
+    ) -> Loss | None:
+        """Write a machine.
+
+        Parameters
+        ----------
+        machine : Robot or SerialArm
+            One that it takes.
+        path : path
+            The file, or the folder.
+        options : mapping, optional
+            Values of `options`.
+
+        Returns
+        -------
+        Loss or None
+            What is lost of the machine; None where nothing is, or nothing can be said.
+
+        Raises
+        ------
+        ValueError
+            What the target cannot hold.
+        """
+        from pkmcal.arms.arm import SerialArm
+        from pkmcal.controllers.loss import Loss, laws
+
+        lost = None
+        if isinstance(machine, SerialArm):
+            lost = None if machine.laws is None else laws(machine)
+            machine = machine.rigid
+        found = self.writer(machine, path, **(options or {}))
+        if not Path(path).exists():
+            raise ArgumentError(f"the target {self.name} wrote no {Path(path).name}")
+        return found if isinstance(found, Loss) else lost
