@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from itertools import chain
 
 import numpy as np
 
 from pkmcal.arrays import BoolArray, IntArray
 from pkmcal.effects.effect import Effect
+from pkmcal.exceptions import ArgumentError
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.readings.unknowns import PLACE, Dependence, Numbers, Start, points_of
 
@@ -63,7 +65,20 @@ class FitData:
         return np.array([self.starts["touch", name].axis for name in touched.tolist()])
 
     def dependences(self) -> Iterator[Dependence]:
-        """Return the dependences of the readings beside pose and frame."""
-        yield from self.measured.instrument.dependences(self)
-        for effect in self.effects:
-            yield from effect.dependences(self.measured)
+        """Return the dependences of the readings beside pose and frame.
+
+        Raises
+        ------
+        ValueError
+            A dependence that does not have one entry for each row.
+        """
+        own = self.measured.instrument.dependences(self)
+        of_effects = (effect.dependences(self.measured) for effect in self.effects)
+        for each in (*own, *chain.from_iterable(of_effects)):
+            if not len(each.index) == len(each.given) == len(self.measured):
+                raise ArgumentError(
+                    f"{each.argument}: the dependence on it has {len(each.index)} names and"
+                    f" {len(each.given)} given numbers; it needs one of each for each of"
+                    f" {len(self.measured)} rows"
+                )
+            yield each

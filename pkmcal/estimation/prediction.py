@@ -17,11 +17,11 @@ from pkmcal.estimation.parameters import Parameters
 from pkmcal.estimation.pose_table import PoseTable, pose_table
 from pkmcal.estimation.row_states import RowStates
 from pkmcal.estimation.sessions import NONE, by_parameters
-from pkmcal.estimation.shapes import require_derivatives, require_moved, require_predicted
+from pkmcal.estimation.shapes import effect_of_rows, require_derivatives, require_moved
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.readings import orientation
-from pkmcal.readings.reading import At, Predicted, joined
+from pkmcal.readings.predicted import At, Predicted, joined, require_predicted
 
 _BATCH = 1024  # rows whose derivatives by the parameters are made at once, as many as caches hold
 
@@ -88,7 +88,8 @@ class Prediction:
                 for mine, part in zip(numbers, table.part_of, strict=True)
             ),
             effects=tuple(
-                tuple(effect.of_rows(data.measured) for effect in data.effects) for data in datasets
+                tuple(effect_of_rows(effect, data.measured) for effect in data.effects)
+                for data in datasets
             ),
         )
 
@@ -164,7 +165,7 @@ class Prediction:
                 found.append(Predicted(np.empty((len(m), 0)), np.empty((len(m), 0, 6))))
                 continue
             alone = self._by_geometry_alone(i, pose, theta)
-            require_predicted(m.instrument, len(m), alone)
+            require_predicted(m.kind, len(m.components), len(m), alone)
             moved = self._moved(i, alone, pose, theta)
             require_derivatives(m.instrument, moved, self.numbers[i])
             found.append(moved)

@@ -371,6 +371,7 @@ class Table:
             dict.fromkeys(
                 u for q in quantities for u in units.factors(q) if u.isascii() and u.isalnum()
             )
+            or quantities
         )
         if not column.unit and "1" in quantities:
             return "1", (1.0, 1.0)

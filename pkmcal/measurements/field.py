@@ -8,7 +8,9 @@ them, in their order there.
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Collection, Iterator, Sequence
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -37,12 +39,15 @@ class Field:
     unit : str or None
         Of its one column, where it has no methods for columns of its own; "": numbers without unit,
         None: names.
+    blank : bool
+        Whether cells of its one column may be empty: NaN then.
     """
 
     name = ""
     logged = False
     log_first = False
     unit: str | None = ""
+    blank = False
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
@@ -82,13 +87,13 @@ class Field:
     def read(self, table: Table, instrument: Reading, units: Sequence[str]) -> Any:
         """Read the field of a table; None where it states nothing. `units` are the actuators'.
 
-        By default its one column: numbers, NaN where a cell is empty, or names.
+        By default its one column, of numbers or names.
         """
         if self.name not in table.columns:
             return None
         if self.unit is None:
             return np.array(table.texts(self.name))
-        return table.numbers(self.name, self.unit or "1", blank=True)[0]
+        return table.numbers(self.name, self.unit or "1", blank=self.blank)[0]
 
     def columns(self, m: Any, units: Sequence[str]) -> Iterator[WrittenColumn]:
         """Write the field's columns; by default one of the entries (N,), none where it is None."""
@@ -108,10 +113,34 @@ class Field:
         return ""
 
 
-def row_fields(measurements: type) -> tuple[Field, ...]:
+Fields = tuple[Field, ...]
+
+
+def row_fields(measurements: type) -> Fields:
     """The fields that a class of measurements has, in the order of its attributes."""
     every = (each.default for each in dataclasses.fields(measurements))
     return tuple(each for each in every if isinstance(each, Field))
+
+
+@cache
+def require_other_columns(
+    reading: str, columns: tuple[tuple[str, str], ...], labels: tuple[str, ...], fields: Fields
+) -> None:
+    """Refuse a class of readings with a component or a label that is a column of other things.
+
+    Raises
+    ------
+    ValueError
+        Its name: that of a field of the rows, of an actuator or of a column of the table.
+    """
+    components = [name for name, _ in columns]
+    taken = {"row", *(name for each in fields for name in each.names((), components))}
+    for name in (*components, *labels):
+        if name in taken or re.fullmatch(r"q\d+", name):
+            raise ArgumentError(
+                f"kind: {reading} calls a column {name!r}, which measurements have for"
+                " something else; give it another name"
+            )
 
 
 def declared(field: Field) -> Any:
@@ -119,9 +148,12 @@ def declared(field: Field) -> Any:
     return field
 
 
-def row_numbers(name: str, given: ArrayLike, rows: int) -> FloatArray:
-    """A copy as finite doubles, one per row; of one row the number alone will do."""
-    array = numbers(name, given)
+def row_numbers(name: str, given: ArrayLike, rows: int, blank: bool = False) -> FloatArray:
+    """A copy as finite doubles, one per row; of one row the number alone will do.
+
+    `blank`: NaN is a number that is not there.
+    """
+    array = numbers(name, given, blank)
     array = array[None] if rows == 1 and array.ndim == 0 else array
     if array.shape != (rows,):
         raise ArgumentError(f"{name} must have shape ({rows},); found {array.shape}")

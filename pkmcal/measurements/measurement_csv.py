@@ -360,7 +360,12 @@ def _known(
 
 def _reading(table: Table, several: tuple[str, ...], readings: Sequence[Reading]) -> Reading:
     """Read the measured quantity, by the columns that are there."""
-    found: dict[str, Reading] = {title: each for each in readings for title in each.found_in(table)}
+    found: dict[str, Reading] = {}
+    for each in readings:
+        for title in each.found_in(table):
+            if title in found and each in KINDS.values():  # one that the caller states comes first
+                raise table.header_error(f"{title}: {found[title].noun()} or {each.noun()}?")
+            found[title] = each
     if several:
         found[f"several targets ({', '.join(several)})"] = Position()
     if len(found) > 1:

@@ -20,7 +20,13 @@ from pkmcal.kinematics.drive_state import DriveState
 from pkmcal.measurements.actuator_sigma import ActuatorSigma
 from pkmcal.measurements.approach import Approach
 from pkmcal.measurements.carried_load import CarriedLoad
-from pkmcal.measurements.field import declared, row_fields, units_of_actuators, values_array
+from pkmcal.measurements.field import (
+    declared,
+    require_other_columns,
+    row_fields,
+    units_of_actuators,
+    values_array,
+)
 from pkmcal.measurements.former import OF_MEASUREMENTS, adapted
 from pkmcal.measurements.listing import table, title
 from pkmcal.measurements.measurement_writer import write_measurements
@@ -191,6 +197,9 @@ class Measurements(Result):
         present = (*rowwise, *_ARGUMENTS)
         instrument = adapted(
             "Measurements", stated(kind, instrument), fields, OF_MEASUREMENTS, present
+        )
+        require_other_columns(
+            type(instrument).__name__, instrument.components, instrument.labels, of_rows
         )
         q = numbers("actuators", actuators)
         if q.ndim not in (1, 2) or 0 in q.shape:

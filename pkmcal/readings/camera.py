@@ -30,7 +30,8 @@ from pkmcal.readings.boards import Board
 from pkmcal.readings.lens_doubts import facing, lens_doubts
 from pkmcal.readings.lens_files import read_lens
 from pkmcal.readings.measured import InFit, Measured
-from pkmcal.readings.reading import At, Predicted, Reading, Sets, Solve
+from pkmcal.readings.predicted import At, Predicted
+from pkmcal.readings.reading import Reading, Sets, Solve
 from pkmcal.readings.seen_places import disagreement, in_agreement
 from pkmcal.readings.sight import visible
 from pkmcal.readings.unknowns import PLACE, Dependence, Numbers, Start, always
