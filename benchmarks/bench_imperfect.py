@@ -4,7 +4,7 @@
 
 Of a scenario that should be seen none may be calibrated with less than 90 % of the true values
 inside; sound data keep 93 % and are doubted in 2 of 100 at most. The others are true, doubted, or
-unseen: those are listed in docs/believe.md.
+unseen: those are listed in docs/model-errors.md.
 """
 
 from __future__ import annotations

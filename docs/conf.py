@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import re
 from importlib import metadata
+from pathlib import Path
 from typing import Any
 
+import pkmcal as pk
+from pkmcal.files.toml_lines import tomllib
 from pkmcal.result import Result
 
 project = "pkmcal"
@@ -55,6 +58,17 @@ def signature_of_class(
     return None
 
 
+def pages_of_machines(app: Any, error: Exception | None) -> None:
+    """Write the page of each machine of the gallery, which its picture opens."""
+    if error is None and app.builder.format == "html":
+        machines = Path(app.confdir, "gallery", "machines.toml").read_text(encoding="utf-8")
+        folder = Path(app.outdir, "docs", "gallery")
+        folder.mkdir(parents=True, exist_ok=True)
+        for stem, source in tomllib.loads(machines).items():
+            pk.load(source).show(folder / f"{stem}.html")
+
+
 def setup(app: Any) -> None:
-    """Connect to Sphinx, before numpydoc looks at signatures."""
+    """Connect to Sphinx, before numpydoc looks at signatures, and when all pages are written."""
     app.connect("autodoc-process-signature", signature_of_class, priority=400)
+    app.connect("build-finished", pages_of_machines)

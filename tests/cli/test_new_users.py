@@ -24,10 +24,9 @@ NOISE = 0.01
 
 
 def test_from_printer_cfg_to_new_values(run: Any, tmp_path: Path) -> None:
-    """The commands are those of docs/controllers.md, one by one."""
-    page = (ROOT / "docs" / "controllers.md").read_text("utf-8")
-    section = page.split("## Klipper and Kalico")[1].split("\n## ")[0]
-    commands = [shlex.split(line[2:]) for line in section.splitlines() if line.startswith("$ ")]
+    """The commands are those of docs/klipper.md, one by one."""
+    page = (ROOT / "docs" / "klipper.md").read_text("utf-8")
+    commands = [shlex.split(line[2:]) for line in page.splitlines() if line.startswith("$ ")]
     assert [command[:2] for command in commands[1:4]] == [
         ["pkmcal", "import"], ["pkmcal", "calibrate"], ["pkmcal", "export"],
     ]  # fmt: skip
@@ -171,8 +170,8 @@ def test_a_log_that_is_a_row_late_is_joined_as_its_message_says(
 def test_from_two_raw_files_to_a_sheet(
     run: Any, command: list[Any], hexapod: Path, tmp_path: Path
 ) -> None:
-    """The command is that of docs/command-line.md."""
-    page = " ".join((ROOT / "docs" / "command-line.md").read_text("utf-8").split())
+    """The command is that of docs/certificate.md."""
+    page = " ".join((ROOT / "docs" / "certificate.md").read_text("utf-8").split())
     options = ("--drop-outliers", "--datum", "auto", "--certificate", "certificate.toml")
     assert " ".join(options) in page
     options = (*options[:-1], str(hexapod / "certificate.toml"))

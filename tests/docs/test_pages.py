@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import runpy
 from dataclasses import fields
 from pathlib import Path
 from pkgutil import resolve_name
@@ -10,6 +11,7 @@ from pkgutil import resolve_name
 import pytest
 
 import pkmcal as pk
+from pkmcal.files.toml_lines import tomllib
 
 from .pages import DOCS, PAGES, ROOT, MissingLog, Session, blocks, name_of, prose
 
@@ -137,6 +139,24 @@ def test_rooms_of_the_architecture_are_those_of_the_contract() -> None:
         for cell in re.findall(r"^\| \d+ \| ([^|]+) \|", text, re.MULTILINE)
     ]
     assert [sorted(floor) for floor in stated] == [sorted(floor) for floor in shown]
+
+
+def test_picture_of_the_floors_is_that_of_the_contract() -> None:
+    drawn = runpy.run_path(str(DOCS / "architecture" / "draw.py"))
+    assert drawn["svg"]() == (DOCS / "architecture" / "floors.svg").read_text(encoding="utf-8")
+
+
+def test_gallery_has_a_picture_and_a_page_of_twelve_machines() -> None:
+    folder = DOCS / "gallery"
+    machines = tomllib.loads((folder / "machines.toml").read_text(encoding="utf-8"))
+    text = (DOCS / "gallery.md").read_text(encoding="utf-8")
+    assert len(machines) == 12
+    assert re.findall(r":target: gallery/(.*)\.html$", text, re.MULTILINE) == list(machines)
+    for stem, source in machines.items():
+        assert f"gallery/{stem}.png" in text
+        assert 2_000 < (folder / f"{stem}.png").stat().st_size < 30_000
+        named = source in pk.machines()
+        assert named or (ROOT / source).exists()
 
 
 # --- the reference, the glossary, the citation ---------------------------------------------------

@@ -73,7 +73,7 @@ def test_offsets_5_and_3_moved_and_nothing_else(
     assert found.holdout_contradicts and found.verdict.state == "doubtful"
     if later == 2:
         lengths = found.holdout_families[0]
-        assert lengths.rms == pytest.approx(1.9, abs=0.05)  # calibration.md says it
+        assert lengths.rms == pytest.approx(1.9, abs=0.05)  # sessions.md says it
     assert str(found).startswith("Doubtful: the held-out lengths ")
     assert "moved, or the model is wrong there: offset5 by" in found.verdict.reasons[1]
     assert found.verdict.reasons[1].endswith(
@@ -88,7 +88,7 @@ def test_the_second_session_is_as_expected_after_its_own_zeros(hexapod: pk.Robot
     assert found.holdout_families[0].rms < 0.86
     assert not found.holdout_contradicts and found.moved == ()
     lengths = found.holdout_families[0]
-    assert lengths.expected == pytest.approx(0.97, abs=0.01)  # calibration.md says it
+    assert lengths.expected == pytest.approx(0.97, abs=0.01)  # sessions.md says it
     assert "a curved law of the drives" in str(found)  # which the spools have
     zeros = {name: own["value"] for name, own in found.holdout_parameters.items()}
     shifts = [
@@ -107,7 +107,7 @@ def test_both_sessions_fitted_together_with_zeros_of_their_own(hexapod: pk.Robot
     sets = [session(1), session(2)]
     found = pk.identify(hexapod, sets, per_session="offset*")
     second = np.linalg.norm(found.residuals[1][:, :3], axis=1)
-    assert np.sqrt(np.mean(second**2)) == pytest.approx(0.70, abs=0.01)  # calibration.md says it
+    assert np.sqrt(np.mean(second**2)) == pytest.approx(0.70, abs=0.01)  # sessions.md says it
     assert found.verdict.state != "not calibrated" and len(found.free) == 54
 
 
