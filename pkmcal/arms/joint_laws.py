@@ -16,6 +16,7 @@ differs is of second order, and φ depends on no number of the arm.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -31,6 +32,7 @@ from pkmcal.exceptions import ArgumentError
 TermKind = Literal["sag", "compliance", "cos", "sin", "coupling", "backlash"]
 KINDS: tuple[TermKind, ...] = ("sag", "compliance", "cos", "sin", "coupling", "backlash")
 AXES = ("x", "y", "z")
+_LATELY = 4  # calls whose φ is known
 
 
 class Term(NamedTuple):
@@ -74,25 +76,26 @@ def sag_term(joint: int, link: int, axis: int) -> Term:
 
 
 class Memo:
-    """φ as it was asked for last, which no other numbers of a law change.
+    """φ as it was asked for lately, which no other numbers of a law change.
 
-    A search asks for the same at each step.
+    A search asks for the same at each step: of all rows, and of lots of them.
     """
 
     def __init__(self) -> None:
-        self._last: tuple[tuple[FloatArray | None, ...], FloatArray] | None = None
+        self._last: deque[tuple[tuple[FloatArray | None, ...], FloatArray]] = deque(maxlen=_LATELY)
 
     def of(self, *key: FloatArray | None) -> FloatArray | None:
         """φ of these coordinates and this state, where it is known."""
-        last = self._last
-        if last is None or not all(map(_equal, last[0], key)):
-            return None
-        return last[1]
+        for known, basis in self._last:
+            if len(known) == len(key) and all(map(_equal, known, key)):
+                return basis
+        return None
 
     def keep(self, basis: FloatArray, *key: FloatArray | None) -> None:
         """Know φ of these coordinates and this state; who is given it changes nothing of it."""
         basis.flags.writeable = False
-        self._last = tuple(None if each is None else each.copy() for each in key), basis
+        copied = tuple(None if each is None else each.copy() for each in key)
+        self._last.appendleft((copied, basis))
 
     def __reduce__(self) -> tuple[type[Memo], tuple[()]]:
         return Memo, ()

@@ -86,16 +86,17 @@ class Sag:
             )
         turns = number("turns", self.turns, above=0.0)
         arm = machine.arm
-        joints = self._chosen(arm)
+        products = _products(arm)
+        joints = self._chosen(arm, products)
         if self.tied:
             return _tied(arm, joints, turns)
-        terms = _independent(arm, joints)
+        terms = _independent(products, joints)
         own = dict.fromkeys((term.name for term in terms), turns)
         return Changed(self.name, ArmMachine(arm.with_terms(terms)), own)
 
-    def _chosen(self, arm: SerialArm) -> list[int]:
-        """The joints that yield, counted from 0."""
-        largest = np.abs(_products(arm)).max(axis=(0, 2, 3))
+    def _chosen(self, arm: SerialArm, products: FloatArray) -> list[int]:
+        """The joints that yield, counted from 0, by what gravity does in all postures."""
+        largest = np.abs(products).max(axis=(0, 2, 3))
         turned: list[int] = np.flatnonzero(largest > _NOTHING).tolist()
         if not turned:
             raise ArgumentError(f"sag: gravity turns no joint of {arm.name}")
@@ -145,12 +146,11 @@ def _levers(arm: SerialArm) -> FloatArray:
     return rms
 
 
-def _independent(arm: SerialArm, joints: Sequence[int]) -> list[Term]:
+def _independent(products: FloatArray, joints: Sequence[int]) -> list[Term]:
     """Products of which each turns its joint otherwise than those before it.
 
     A moment along the axis of the next joint turns with that joint's link as well.
     """
-    products = _products(arm)
     found: list[Term] = []
     for joint in joints:
         basis = np.zeros((_POSTURES, 0))
