@@ -8,10 +8,12 @@ from collections.abc import Sequence
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.number_text import typed
 from pkmcal.geometry.carried import Load
+from pkmcal.geometry.yielding import elastic_numbers
 from pkmcal.jobs.rows import numbers_on_line
 from pkmcal.kinematics.robot import Robot
 
 _MASSES = {"": 1.0, "kg": 1.0, "g": 1e-3, "t": 1e3, "lb": 0.45359237}  # kg
+_SOFTEST = 1.0  # mm/N: 1 kg moves the number by 1 cm
 _MASS = re.compile(r"(.*?)\s*([a-z]*)")
 _TOOL = re.compile(r"[Tt]?(\d+)\s*=([^,]*)(?:,(.*))?", re.ASCII)
 
@@ -49,16 +51,37 @@ def loads_by_tool(texts: list[str] | None) -> dict[int, Load]:
 def yielding(robot: Robot, compliances: Sequence[str] | None) -> Robot:
     """The robot with what the options say that yields."""
     found: dict[str, float] = {}
+    by: dict[str, str] = {}  # the pattern that a number was named with
     for text in compliances or ():
         for part in text.split(","):
-            name, equals, value = part.partition("=")
+            pattern, equals, value = (each.strip() for each in part.partition("="))
             try:
-                found[name.strip()] = typed(value)
+                given = typed(value)
             except ValueError:
                 equals = ""
             if not equals:
                 raise ArgumentError(f"--compliance must be NAME=C, found {part!r}")
+            for name in elastic_numbers(robot.model, pattern):
+                if name in by:
+                    twice = pattern if pattern == by[name] else f"{by[name]} and {pattern}"
+                    raise ArgumentError(f"--compliance states {name} twice, by {twice}")
+                by[name] = pattern
+            _require_compliance(pattern, given)
+            found[pattern] = given
     return robot.yielding(found) if found else robot
+
+
+def _require_compliance(pattern: str, value: float) -> None:
+    """Refuse what is no compliance of a machine: none at all, or a stiffness."""
+    if value == 0.0:
+        raise ArgumentError(
+            f"--compliance {pattern} is 0: what does not yield is left out; found {value:g}"
+        )
+    if value > _SOFTEST:
+        raise ArgumentError(
+            f"--compliance {pattern} is {value:g} mm/N or rad/(N mm), softer than any machine: if"
+            f" that is a stiffness in N/mm, its compliance is {1.0 / value:.4g}"
+        )
 
 
 def mass(option: str, text: str) -> float:
