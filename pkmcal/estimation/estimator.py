@@ -165,7 +165,7 @@ class Estimator:
         factor: FloatArray,
         residual: FloatArray,
     ) -> Shares | None:
-        """What no parameters explain in each group, without the prior's help.
+        """Return the residual of each group that no parameters explain, without the prior's help.
 
         `factor` is one of the Jacobian. None where too few equations are left to show it.
         """
@@ -233,7 +233,7 @@ class Estimator:
     def _at_start(
         self, noise: FloatArray, last: IterationState | None, known: Known | None
     ) -> tuple[tuple[Decomposed, Decomposed], FloatArray]:
-        """The start decomposed, and its R; `last` has both for another noise, `known` R alone."""
+        """Decompose the start, and return its R; `last` has both for another noise, `known` R alone."""
         if last is not None:
             known = last.noise, last.start_triangle
             if (noise == last.noise).all():
@@ -352,7 +352,7 @@ class Estimator:
         return self.loss == "linear" or np.allclose(old.loss.width, new.loss.width, rtol=1e-3)
 
     def _common_factor(self, old: IterationState, new: IterationState) -> float | None:
-        """What the noise of all groups has grown by, if nothing but that distinguishes a fit."""
+        """Return the common factor of all groups' noise, as if nothing else distinguished a fit."""
         factor = common(new.noise / old.noise)
         if self.loss != "linear" or old.determined.rank != new.determined.rank:
             return None
@@ -423,6 +423,6 @@ class Estimator:
 
 
 def common(factors: FloatArray) -> float | None:
-    """The factor (G,) of all groups; None where they have different ones."""
+    """Return the factor (G,) of all groups; None where they have different ones."""
     first = float(factors[0])
     return first if (factors == first).all() else None

@@ -1,4 +1,4 @@
-"""Which combinations of the parameters are identifiable, and how well.
+"""Identifiable combinations of the parameters, and how well each is determined.
 
 Everything here is in scaled parameters: 1 means about 1 mm at the machine.
 """
@@ -105,7 +105,7 @@ def directions(
 
 
 def held_errors(jacobian: FloatArray, prior: FloatArray, rank: int, size: float) -> FloatArray:
-    """What combinations may be off by that are held though errors of the machine show them.
+    """Return errors of held combinations that errors of the machine make visible.
 
     The machine as it was found determines a little what the nominal one does not. That is too
     little to be estimated, but what is held there shifts the other parameters.
@@ -218,7 +218,7 @@ def sparse_basis(unidentifiable: FloatArray, names: Sequence[str]) -> FloatArray
 
 
 def _supports(shares: FloatArray) -> Iterator[tuple[Sequence[int], int]]:
-    """Supports of few kinds, few first, then that of all kinds; and how much is in each, at most.
+    """Yield supports of few kinds, then that of all, and how many combinations each has at most.
 
     That is how many combinations have next to nothing outside of it, by the `shares` (k, d, d) of
     the kinds. It is told by eigenvalues, which are the squares of what is outside: quicker than the
@@ -307,7 +307,7 @@ def as_sum(
 
 
 def _counted(unit: str, factor: float) -> str:
-    """How a number that is no length counts among lengths in mm."""
+    """Return the weight of a number that is no length among lengths in mm."""
     if unit == "rad":
         return f"angles as arcs at {factor:.4g} mm"
     return f"numbers {'without unit' if unit == '1' else f'in {unit}'} times {factor:.3g}"
