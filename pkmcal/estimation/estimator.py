@@ -233,7 +233,10 @@ class Estimator:
     def _at_start(
         self, noise: FloatArray, last: IterationState | None, known: Known | None
     ) -> tuple[tuple[Decomposed, Decomposed], FloatArray]:
-        """Decompose the start, and return its R; `last` has both for another noise, `known` R alone."""
+        """Decompose the start, and return its R.
+
+        `last` has both for another noise, `known` has R alone.
+        """
         if last is not None:
             known = last.noise, last.start_triangle
             if (noise == last.noise).all():
