@@ -236,7 +236,7 @@ class JointLaws:
 
     def _basis(self, theta: FloatArray) -> FloatArray:
         found = np.zeros((len(theta), len(self.terms)))
-        at = self._posture(theta) if self._sagging or self.yielding else None
+        at = self.posture(theta) if self._sagging or self.yielding else None
         products = self.pulls.products(at) if self._sagging and at else None
         torques = self.pulls.torques(at, theta) if self.yielding and at else None
         for c, (joint, kind, of) in enumerate(self.terms):
@@ -268,12 +268,21 @@ class JointLaws:
                 found[:, joint, joint] += value * of * np.cos(of * theta[:, joint])
             elif kind == "coupling":
                 found[:, joint, int(of)] += value
-        at = self._posture(theta) if self._sagging or self.yielding else None
+        at = self.posture(theta) if self._sagging or self.yielding else None
         if self._sagging and at:
             found += self.pulls.products_turning(at, self._sags)
         if self.yielding and at:
             found += self._compliances[:, None] * self.pulls.torques_turning(at, theta)
         return found
+
+    def posture(self, theta: FloatArray) -> Posture:
+        """Return where links and axes are at coordinates (N, n), without joint errors."""
+        count, n = theta.shape
+        revolute = np.array([kind == "revolute" for kind in self.pulls.kinds])
+        twists = np.zeros((count, n, 6))
+        twists[..., :3] = (theta * revolute)[..., None] * self.pulls.axes
+        turns = screws.exp(twists.reshape(-1, 6)).reshape(count, n, 4, 4)[..., :3, :3]
+        return self.pulls.posture(turns)
 
     @property
     def _n(self) -> int:
@@ -292,14 +301,6 @@ class JointLaws:
         assert self.approach is not None
         found: FloatArray = self.approach[..., joint]
         return found
-
-    def _posture(self, theta: FloatArray) -> Posture:
-        count, n = theta.shape
-        revolute = np.array([kind == "revolute" for kind in self.pulls.kinds])
-        twists = np.zeros((count, n, 6))
-        twists[..., :3] = (theta * revolute)[..., None] * self.pulls.axes
-        turns = screws.exp(twists.reshape(-1, 6)).reshape(count, n, 4, 4)[..., :3, :3]
-        return self.pulls.posture(turns)
 
     @cached_property
     def _sags(self) -> FloatArray:

@@ -17,7 +17,7 @@ import numpy as np
 from pkmcal.arguments import instance, number
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arms.joint_laws import Term, sag_term
-from pkmcal.arms.weights import gravity_products, gravity_torques
+from pkmcal.arms.weights import gravity_torques
 from pkmcal.arrays import FloatArray
 from pkmcal.effects.effect import Changed
 from pkmcal.exceptions import ArgumentError
@@ -133,7 +133,13 @@ def _gravity(arm: SerialArm) -> FloatArray:
 
 
 def _products(arm: SerialArm) -> FloatArray:
-    return gravity_products(_bare(arm), _postures(arm), _gravity(arm))
+    """Return `gravity_products` in all postures, (_POSTURES, n, n, 3)."""
+    laws, n = arm.joint_laws, arm.n_joints
+    if not laws.pulls.directed:
+        raise ArgumentError("gravity must have a direction, found 0 0 0")
+    behind = np.triu(np.ones((n, n))) * np.array([[unit == "rad"] for unit in arm.actuator_units])
+    products = laws.pulls.products(laws.posture(_postures(arm)))
+    return np.asarray(products * behind[..., None])
 
 
 def _levers(arm: SerialArm) -> FloatArray:

@@ -155,7 +155,12 @@ class Estimator:
         if alone is None:
             return ones, None, (ones, factor)
         freedom = alone[1] if self.equations.machines.unknowns else None
-        return self._kept(ones * self._scored(alone)[0], ones), freedom, (ones, factor)
+        noise = self._kept(ones * self._scored(alone)[0], ones)
+        grown = common(noise)
+        if grown is not None:
+            jacobian /= grown
+            self.search.keep(self.start, noise, jacobian)
+        return noise, freedom, (ones, factor)
 
     def _alone(
         self,
