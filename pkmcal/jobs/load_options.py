@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from typing import TypeVar
 
+from pkmcal.arms.arm import SerialArm
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.number_text import typed
 from pkmcal.geometry.carried import Load
@@ -12,6 +14,7 @@ from pkmcal.geometry.yielding import elastic_numbers
 from pkmcal.jobs.rows import numbers_on_line
 from pkmcal.kinematics.robot import Robot
 
+Machine = TypeVar("Machine", Robot, SerialArm)
 _MASSES = {"": 1.0, "kg": 1.0, "g": 1e-3, "t": 1e3, "lb": 0.45359237}  # kg
 _SOFTEST = 1.0  # mm/N: 1 kg moves the number by 1 cm
 _MASS = re.compile(r"(.*?)\s*([a-z]*)")
@@ -19,8 +22,8 @@ _TOOL = re.compile(r"[Tt]?(\d+)\s*=([^,]*)(?:,(.*))?", re.ASCII)
 
 
 def carrying(
-    robot: Robot, payload: str | None, payload_at: str | None, tool_force: str | None
-) -> Robot:
+    robot: Machine, payload: str | None, payload_at: str | None, tool_force: str | None
+) -> Machine:
     """The robot with the payload of the options; itself without any."""
     if payload is None and payload_at is None and tool_force is None:
         return robot
@@ -31,7 +34,14 @@ def carrying(
         three("--payload-at", payload_at),
         three("--tool-force", tool_force),
     )
-    return robot.carrying(load)
+    if isinstance(robot, Robot):
+        return robot.carrying(load)
+    if robot.laws is None or not robot.laws.yielding:
+        raise ArgumentError(
+            f"robot: {robot.name} is an arm of which nothing yields to a payload: its file states no"
+            " stiffness of a joint"
+        )
+    return robot.under(load)
 
 
 def loads_by_tool(texts: list[str] | None) -> dict[int, Load]:
