@@ -38,16 +38,21 @@ SPRINGS = np.array([2.0, 4.0, 5.0, 15.0, 25.0, 25.0]) * 1e-8  # rad/(N mm)
 FRAME = np.array([700.0, -150.0, 120.0, 0.05, -0.15, 1.2])
 
 
-def payloads(seed: int) -> tuple[pk.Identification, FloatArray]:
-    """Calibrate a hexapod at 25 poses, each with nothing and with 800 N; return the truth, too."""
+def payloads(seed: int, noise: float) -> tuple[pk.Identification, FloatArray]:
+    """Calibrate a hexapod at 25 poses, each with nothing and with 800 N; return the truth, too.
+
+    Poses near a singularity, where the machine gives way under the load, are left out.
+    """
     rng = np.random.default_rng(seed)
     robot = pk.load("hexapod")
     true = robot.yielding({f"offset{i}": rng.uniform(1e-4, 2e-4) for i in range(1, 7)})
     true = true.replace({f"offset{i}": rng.normal(0, 0.3) for i in range(1, 7)})
-    q = robot.inverse(pk.sample_poses(robot, 25, seed=seed))
+    drawn = robot.inverse(pk.sample_poses(robot, 40, seed=seed))
+    most = pk.Load(force=[0.0, 0.0, -800.0])
+    q = drawn[true.forward(drawn).ok & true.forward(drawn, load=most).ok][:25]
     force = np.zeros((50, 3))
     force[25:, 2] = -800.0
-    rows = pk.VirtualMachine(true, NOISE, seed=seed).measure(
+    rows = pk.VirtualMachine(true, noise, seed=seed).measure(
         np.vstack([q, q]), "pose", load=pk.Load(force=force)
     )
     found = pk.identify(robot, rows, effects=[pk.Elasticity("offset*")])
@@ -86,24 +91,30 @@ def takes_sag(found: pk.Identification) -> bool:
     return any(name.startswith("sag") for name in found.free)
 
 
-def main(runs: int = 200) -> None:
-    warnings.simplefilter("ignore", pk.CalibrationWarning)
-    report = Report("effects")
+def compliances(runs: int, noise: float) -> str:
+    """How well a hexapod's compliances are found, in one line."""
     inside = known = calibrated = 0
     off: list[FloatArray] = []
-    start = time.process_time()
     for seed in range(runs):
-        found, truth = payloads(seed)
+        found, truth = payloads(seed, noise)
         low, high = found.interval95.T
         inside, known = inside + int(((low <= truth) & (truth <= high)).sum()), known + len(truth)
         soft = [i for i, name in enumerate(found.free) if name.startswith("compliance")]
         off.append(found.values[soft] / truth[soft] - 1)
         calibrated += found.verdict.state == "calibrated"
-    report.text(
-        f"compliances of a hexapod, 25 poses under 0 and 800 N: {calibrated} of {runs} calibrated;"
-        f" {100 * inside / known:.1f} % of all numbers inside of their 95 % intervals; compliances"
-        f" off by {100 * float(np.sqrt(np.mean(np.square(off)))):.1f} % rms"
+    return (
+        f"compliances of a hexapod, 25 poses under 0 and 800 N, poses to {noise} mm: {calibrated}"
+        f" of {runs} calibrated; {100 * inside / known:.1f} % of all numbers inside of their 95 %"
+        f" intervals; compliances off by {100 * float(np.sqrt(np.mean(np.square(off)))):.1f} % rms"
     )
+
+
+def main(runs: int = 200) -> None:
+    warnings.simplefilter("ignore", pk.CalibrationWarning)
+    report = Report("effects")
+    start = time.process_time()
+    for noise in (0.01, 0.02):
+        report.text(compliances(runs, noise))
     for shared in (0.0, 0.05):
         taken = share_of(
             runs, lambda s, e=shared: takes_sag(fitted(arm_rows(s, False, e, 40), "auto"))

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -188,8 +188,8 @@ class SerialArm(SerialChain, Result):
         ValueError, TypeError
             A wrong shape, no numbers, or errors that are not finite.
         """
-        changed: Any = {**self.arguments, "joint_errors": joint_errors}
-        return SerialArm(**changed)
+        errors, links = self._linked(joint_errors)
+        return self._like(_errors=errors, _links=links)
 
     def corrected(self) -> SerialArm:
         """Return the arm with its joint errors built into axes, points and home, none beside them.
@@ -220,8 +220,7 @@ class SerialArm(SerialChain, Result):
 
     def with_laws(self, laws: JointLaws | None) -> SerialArm:
         """The arm with other laws of its joints, or without."""
-        changed: Any = {**self.arguments, "laws": laws}
-        return SerialArm(**changed)
+        return self._like(_laws=laws)
 
     def with_terms(self, terms: Iterable[Term]) -> SerialArm:
         """The arm with these numbers among those of its joints, 0 where they are new."""

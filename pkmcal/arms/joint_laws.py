@@ -16,6 +16,7 @@ differs is of second order, and φ depends on no number of the arm.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -31,6 +32,7 @@ from pkmcal.exceptions import ArgumentError
 TermKind = Literal["sag", "compliance", "cos", "sin", "coupling", "backlash"]
 KINDS: tuple[TermKind, ...] = ("sag", "compliance", "cos", "sin", "coupling", "backlash")
 AXES = ("x", "y", "z")
+_LATELY = 4  # calls whose φ is known
 
 
 class Term(NamedTuple):
@@ -74,25 +76,26 @@ def sag_term(joint: int, link: int, axis: int) -> Term:
 
 
 class Memo:
-    """φ as it was asked for last, which no other numbers of a law change.
+    """φ as it was asked for lately, which no other numbers of a law change.
 
-    A search asks for the same at each step.
+    A search asks for the same at each step: of all rows, and of lots of them.
     """
 
     def __init__(self) -> None:
-        self._last: tuple[tuple[FloatArray | None, ...], FloatArray] | None = None
+        self._last: deque[tuple[tuple[FloatArray | None, ...], FloatArray]] = deque(maxlen=_LATELY)
 
     def of(self, *key: FloatArray | None) -> FloatArray | None:
         """φ of these coordinates and this state, where it is known."""
-        last = self._last
-        if last is None or not all(map(_equal, last[0], key)):
-            return None
-        return last[1]
+        for known, basis in self._last:
+            if len(known) == len(key) and all(map(_equal, known, key)):
+                return basis
+        return None
 
     def keep(self, basis: FloatArray, *key: FloatArray | None) -> None:
         """Know φ of these coordinates and this state; who is given it changes nothing of it."""
         basis.flags.writeable = False
-        self._last = tuple(None if each is None else each.copy() for each in key), basis
+        copied = tuple(None if each is None else each.copy() for each in key)
+        self._last.appendleft((copied, basis))
 
     def __reduce__(self) -> tuple[type[Memo], tuple[()]]:
         return Memo, ()
@@ -233,7 +236,7 @@ class JointLaws:
 
     def _basis(self, theta: FloatArray) -> FloatArray:
         found = np.zeros((len(theta), len(self.terms)))
-        at = self._posture(theta) if self._sagging or self.yielding else None
+        at = self.posture(theta) if self._sagging or self.yielding else None
         products = self.pulls.products(at) if self._sagging and at else None
         torques = self.pulls.torques(at, theta) if self.yielding and at else None
         for c, (joint, kind, of) in enumerate(self.terms):
@@ -265,12 +268,21 @@ class JointLaws:
                 found[:, joint, joint] += value * of * np.cos(of * theta[:, joint])
             elif kind == "coupling":
                 found[:, joint, int(of)] += value
-        at = self._posture(theta) if self._sagging or self.yielding else None
+        at = self.posture(theta) if self._sagging or self.yielding else None
         if self._sagging and at:
             found += self.pulls.products_turning(at, self._sags)
         if self.yielding and at:
             found += self._compliances[:, None] * self.pulls.torques_turning(at, theta)
         return found
+
+    def posture(self, theta: FloatArray) -> Posture:
+        """Return where links and axes are at coordinates (N, n), without joint errors."""
+        count, n = theta.shape
+        revolute = np.array([kind == "revolute" for kind in self.pulls.kinds])
+        twists = np.zeros((count, n, 6))
+        twists[..., :3] = (theta * revolute)[..., None] * self.pulls.axes
+        turns = screws.exp(twists.reshape(-1, 6)).reshape(count, n, 4, 4)[..., :3, :3]
+        return self.pulls.posture(turns)
 
     @property
     def _n(self) -> int:
@@ -289,14 +301,6 @@ class JointLaws:
         assert self.approach is not None
         found: FloatArray = self.approach[..., joint]
         return found
-
-    def _posture(self, theta: FloatArray) -> Posture:
-        count, n = theta.shape
-        revolute = np.array([kind == "revolute" for kind in self.pulls.kinds])
-        twists = np.zeros((count, n, 6))
-        twists[..., :3] = (theta * revolute)[..., None] * self.pulls.axes
-        turns = screws.exp(twists.reshape(-1, 6)).reshape(count, n, 4, 4)[..., :3, :3]
-        return self.pulls.posture(turns)
 
     @cached_property
     def _sags(self) -> FloatArray:

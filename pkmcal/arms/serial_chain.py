@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,6 +28,8 @@ from pkmcal.arrays import FloatArray, IntArray, Unit, as_rows
 from pkmcal.core.screws import Arm, Links
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.stated_uncertainty import StatedUncertainty, Uncertain, stated_uncertainty
+
+Chain = TypeVar("Chain", bound="SerialChain")
 
 
 class SerialChain:
@@ -64,12 +67,7 @@ class SerialChain:
         self._home = motion("home", home)
         prismatic = np.array([kind == "prismatic" for kind in self._kinds], dtype=np.int32)
         self.core = Arm(prismatic, joint_frames(self._axes), self._points, self._home)
-        self._errors = np.zeros((self.n_joints, 6))
-        if joint_errors is not None:
-            self._errors += checked_errors(joint_errors, self.n_joints, ())
-        self._links = self.core.links(self._errors)
-        if not np.isfinite(self._links.numbers).all():
-            raise ArgumentError("points, home or joint_errors are too large to be computed with")
+        self._errors, self._links = self._linked(joint_errors)
 
     @property
     def name(self) -> str:
@@ -325,11 +323,25 @@ class SerialChain:
         laws = None if self._laws is None else self._laws.of_rows(rows)
         if laws is self._laws:
             return self
-        changed = self.arguments
-        changed["laws"] = laws
-        return SerialChain(**changed)
+        return self._like(_laws=laws)
 
     # --------------------------------------------------------------------------------------------
+
+    def _linked(self, joint_errors: ArrayLike | None) -> tuple[FloatArray, Links]:
+        """Return joint errors as they are kept, and the links that they make."""
+        errors = np.zeros((self.n_joints, 6))
+        if joint_errors is not None:
+            errors += checked_errors(joint_errors, self.n_joints, ())
+        links = self.core.links(errors)
+        if not np.isfinite(links.numbers).all():
+            raise ArgumentError("points, home or joint_errors are too large to be computed with")
+        return errors, links
+
+    def _like(self: Chain, **changed: Any) -> Chain:
+        """Copy the chain but for some attributes: all else is checked already."""
+        found = object.__new__(type(self))
+        vars(found).update(vars(self), **changed)
+        return found
 
     def _moved(self, rows: FloatArray) -> FloatArray:
         """Return the true joint coordinates at these commands."""

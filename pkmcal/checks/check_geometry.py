@@ -29,7 +29,7 @@ from pkmcal.checks.layout import (
     swapped,
     unlike,
 )
-from pkmcal.checks.loads import sags
+from pkmcal.checks.loads import arm_sags, sags
 from pkmcal.display import Table
 from pkmcal.kinematics.pulled import on_cables
 from pkmcal.kinematics.robot import Robot
@@ -125,7 +125,7 @@ def check_geometry(robot: Robot | SerialArm) -> GeometryCheck:
         axis      an axis of a U along its rod
         drive     drive laws that may turn back within their stroke: they have no inverse
         tension   a home at which not all cables can pull
-        load      a sag at home that no machine has: stiffness or masses in other units
+        load      a sag that no machine has: stiffness, masses or gravity in other units
         stated    numbers that contradict what the robot file states
         ========  ==========================================================================
 
@@ -150,8 +150,8 @@ def check_geometry(robot: Robot | SerialArm) -> GeometryCheck:
     remarks on that.
 
     Of a serial arm fewer things can be checked: lengths, joint errors and Denavit–Hartenberg twists
-    in another unit (unit, angle), and neighbouring joints on one axis (double), where
-    ``Finding.limbs`` counts joints.
+    in another unit (unit, angle), neighbouring joints on one axis (double), and how far it sags
+    (load), where ``Finding.limbs`` counts joints.
 
     Examples
     --------
@@ -162,7 +162,7 @@ def check_geometry(robot: Robot | SerialArm) -> GeometryCheck:
     'angle'
     """
     if isinstance(robot, SerialArm):
-        found = [finding for check in ARM_CHECKS for finding in check(robot)]
+        found = [finding for check in (*ARM_CHECKS, arm_sags) for finding in check(robot)]
     else:
         instance("robot", robot, Robot, " or SerialArm")
         checks: Sequence[Callable[[Robot], Iterator[Finding]]] = CHECKS

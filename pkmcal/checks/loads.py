@@ -1,22 +1,28 @@
-"""Mistakes that show in how far a machine yields: compliances and masses in other units."""
+"""Mistakes that show in how far a machine yields: compliances, masses, gravity in other units."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from pkmcal.arms.arm import SerialArm
 from pkmcal.checks.finding import Finding
 from pkmcal.geometry.elastic import COMPLIANCE, PER_LENGTH
 from pkmcal.kinematics.robot import Robot
 
 _MOST = 0.01  # of the size: what no machine sags at home
+_STRONGEST = 30.0  # m/s²: no machine on a planet is under more
+_POSTURES = 100
+_UNITS = "stiffnesses are in N/mm and N m/rad, compliances in mm/N and rad/(N mm), masses in kg"
 
 
 def sags(robot: Robot) -> Iterator[Finding]:
     """A sag at home that no machine has."""
     if robot is robot.rigid:
         return
+    if robot.model.elastic is not None:
+        yield from _gravity(robot.model.elastic.gravity)
     geometry = dict(robot.geometry.items())
     for name, value in geometry.items():
         if name.startswith(COMPLIANCE) and not name.endswith(PER_LENGTH) and value < 0.0:
@@ -33,8 +39,45 @@ def sags(robot: Robot) -> Iterator[Finding]:
         return
     what = f"sags by {sag:.4g} mm" if found.ok else found.STATUS[int(found.status)]
     yield Finding(
-        "load",
-        (),
-        f"at home the machine {what} under the load that its file states",
-        "stiffnesses are in N/mm and N m/rad, compliances in mm/N and rad/(N mm), masses in kg",
+        "load", (), f"at home the machine {what} under the load that its file states", _UNITS
     )
+
+
+def arm_sags(arm: SerialArm) -> Iterator[Finding]:
+    """Yield gravity that no arm is under, compliances below 0, and a sag that no arm has."""
+    if arm.laws is None:
+        return
+    yield from _gravity(arm.laws.pulls.gravity)
+    for term, value in arm.laws.numbers.items():
+        if term.kind == "compliance" and value < 0.0:
+            yield Finding(
+                "load",
+                (term.joint + 1,),
+                f"{term.name} is {value:.3g}, below 0: no spring",
+                "a calibration may find that of what does not yield; hold it at 0",
+            )
+    if not arm.laws.yielding:
+        return
+    turning = np.array([unit == "rad" for unit in arm.actuator_units])
+    postures = np.random.default_rng(0).uniform(-np.pi, np.pi, (_POSTURES, arm.n_joints)) * turning
+    moved = arm.forward(postures)[:, :3, 3] - arm.rigid.forward(postures)[:, :3, 3]
+    sag = float(np.median(np.linalg.norm(moved, axis=1)))
+    if sag > _MOST * arm.length:
+        yield Finding(
+            "load",
+            (),
+            f"in half of all postures the arm sags by more than {sag:.4g} mm under the weights that"
+            " its file states",
+            _UNITS,
+        )
+
+
+def _gravity(gravity: Sequence[float]) -> Iterator[Finding]:
+    size = float(np.linalg.norm(gravity))
+    if size > _STRONGEST:
+        yield Finding(
+            "load",
+            (),
+            f"gravity is {size:.6g} m/s²",
+            "it is in m/s², 9.80665 on earth: were mm/s² meant?",
+        )

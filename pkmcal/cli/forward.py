@@ -14,7 +14,6 @@ from pkmcal.cli.options import Force, Json, Radians, RobotOrArm
 from pkmcal.cli.output import say
 from pkmcal.cli.rows import POSE_UNITS, table
 from pkmcal.core.library import POSE, STATUS
-from pkmcal.exceptions import ArgumentError
 from pkmcal.jobs.inputs import Inputs
 from pkmcal.jobs.load_options import carrying
 from pkmcal.jobs.output import Output
@@ -51,11 +50,7 @@ def forward(
     """
     read = Inputs()
     loaded = pk.load(read.robot(robot))
-    if isinstance(loaded, pk.Robot):
-        loaded = carrying(loaded, payload, payload_at, tool_force)
-    elif payload or payload_at or tool_force:
-        raise ArgumentError(f"robot: {loaded.name} is an arm, which carries no payload here")
-    machine = as_machine(loaded)
+    machine = as_machine(carrying(loaded, payload, payload_at, tool_force))
     units = reading_units(machine)
     row = numbers_on_line("actuators", actuators, units, rad)
     q = read_commands(read.file(actuators), units) if row is None else row

@@ -17,7 +17,7 @@ import numpy as np
 from pkmcal.arguments import instance, number
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arms.joint_laws import Term, sag_term
-from pkmcal.arms.weights import gravity_products, gravity_torques
+from pkmcal.arms.weights import gravity_torques
 from pkmcal.arrays import FloatArray
 from pkmcal.effects.effect import Changed
 from pkmcal.exceptions import ArgumentError
@@ -86,16 +86,17 @@ class Sag:
             )
         turns = number("turns", self.turns, above=0.0)
         arm = machine.arm
-        joints = self._chosen(arm)
+        products = _products(arm)
+        joints = self._chosen(arm, products)
         if self.tied:
             return _tied(arm, joints, turns)
-        terms = _independent(arm, joints)
+        terms = _independent(products, joints)
         own = dict.fromkeys((term.name for term in terms), turns)
         return Changed(self.name, ArmMachine(arm.with_terms(terms)), own)
 
-    def _chosen(self, arm: SerialArm) -> list[int]:
-        """The joints that yield, counted from 0."""
-        largest = np.abs(_products(arm)).max(axis=(0, 2, 3))
+    def _chosen(self, arm: SerialArm, products: FloatArray) -> list[int]:
+        """The joints that yield, counted from 0, by what gravity does in all postures."""
+        largest = np.abs(products).max(axis=(0, 2, 3))
         turned: list[int] = np.flatnonzero(largest > _NOTHING).tolist()
         if not turned:
             raise ArgumentError(f"sag: gravity turns no joint of {arm.name}")
@@ -132,7 +133,13 @@ def _gravity(arm: SerialArm) -> FloatArray:
 
 
 def _products(arm: SerialArm) -> FloatArray:
-    return gravity_products(_bare(arm), _postures(arm), _gravity(arm))
+    """Return `gravity_products` in all postures, (_POSTURES, n, n, 3)."""
+    laws, n = arm.joint_laws, arm.n_joints
+    if not laws.pulls.directed:
+        raise ArgumentError("gravity must have a direction, found 0 0 0")
+    behind = np.triu(np.ones((n, n))) * np.array([[unit == "rad"] for unit in arm.actuator_units])
+    products = laws.pulls.products(laws.posture(_postures(arm)))
+    return np.asarray(products * behind[..., None])
 
 
 def _levers(arm: SerialArm) -> FloatArray:
@@ -145,12 +152,11 @@ def _levers(arm: SerialArm) -> FloatArray:
     return rms
 
 
-def _independent(arm: SerialArm, joints: Sequence[int]) -> list[Term]:
+def _independent(products: FloatArray, joints: Sequence[int]) -> list[Term]:
     """Products of which each turns its joint otherwise than those before it.
 
     A moment along the axis of the next joint turns with that joint's link as well.
     """
-    products = _products(arm)
     found: list[Term] = []
     for joint in joints:
         basis = np.zeros((_POSTURES, 0))

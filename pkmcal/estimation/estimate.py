@@ -32,6 +32,8 @@ class IterationState:
         A standard deviation, mm: the machine's size, or less where searches did not end.
     at_start : tuple of Decomposed
         Combinations at the start, without and with the prior, at this noise.
+    start_triangle : ndarray (k, n)
+        R of the scaled, whitened Jacobian there.
     first_freedom : ndarray (G,) or None
         Degrees of freedom at equal noise of all groups, where poses have unknowns and some noise
         has been estimated.
@@ -44,6 +46,7 @@ class IterationState:
     fitted: Directions
     worst: float
     at_start: tuple[Decomposed, Decomposed]
+    start_triangle: FloatArray
     first_freedom: FloatArray | None = None
 
 
@@ -106,10 +109,13 @@ class Estimate:
         matrix: FloatArray = self.half @ self.half.T
         return matrix
 
-    def change(self, steps: FloatArray) -> FloatArray:
-        """Differentiate whitened predicted values (M, ...) by scaled parameters (n, ...)."""
+    def change(self, steps: FloatArray, design: FloatArray | None = None) -> FloatArray:
+        """Differentiate whitened predicted values (M, ...) by scaled parameters (n, ...).
+
+        `design` may be turned rows (k, n) in place of its own.
+        """
         inverse = (self.basis / (self.basis**2).sum(axis=0)).T
-        found: FloatArray = self.design @ (inverse @ steps)
+        found: FloatArray = (self.design if design is None else design) @ (inverse @ steps)
         return found
 
     @property

@@ -37,6 +37,8 @@ LEAST_FREEDOM = 0.5  # degrees of freedom from which the noise can be estimated
 FEW = 5.0  # below which residuals hardly show it
 LEAST_REDUNDANCY = 2.0  # the same of one group of several that share poses
 
+Known = tuple[FloatArray, FloatArray]  # a noise (G,), and R of the Jacobian with it
+
 
 class Estimator:
     """Weighted least squares, iterated with the noise and rank that they imply.
@@ -79,8 +81,9 @@ class Estimator:
         The search begins at `near`, or else at the start.
         """
         size = self.start.robot.length
-        noise, freedom = self._first_noise()
-        state = replace(self._state(noise, self._first_loss(), size), first_freedom=freedom)
+        noise, freedom, known = self._first_noise()
+        state = self._state(noise, self._first_loss(), size, known=known)
+        state = replace(state, first_freedom=freedom)
         if not state.fitted.rank:
             names = ", ".join(self.equations.parameters.names)
             raise FitError(f"they depend on none of {names}")
@@ -123,7 +126,7 @@ class Estimator:
         factor = self._common_factor(estimate.state, state)
         if factor is None:
             trail = self.search.at(trail, u, state.noise)
-            estimate = self._estimate(trail, state)
+            estimate = self._estimate(trail, state, estimate)
         else:
             estimate = estimate.with_noise(state, factor)
         self.search.end(trail)
@@ -135,35 +138,43 @@ class Estimator:
         of_units = width[self.equations.blocks.family_of_block]
         return Loss(name, self.equations.blocks.components, of_units)
 
-    def _first_noise(self) -> tuple[FloatArray, FloatArray | None]:
+    def _first_noise(self) -> tuple[FloatArray, FloatArray | None, Known | None]:
         """1 mm where it is not stated; with a prior what the data alone show at the start.
 
         Noise and prior could else excuse each other: much of one leaves little of the other.
-        Where the groups' noise is then not equal, also the `IterationState.first_freedom`.
+        Where the groups' noise is then not equal, also the `IterationState.first_freedom`. And R at
+        the start, where it was made.
         """
         ones = np.ones(len(self.unstated))
         if not self._priors or self.loss != "linear":
-            return ones, None
+            return ones, None, None
         jacobian = self.search.jacobian(self.start, ones)
         residual = self.equations.residual(self.start, ones)
-        alone = self._alone(self.start, ones, jacobian, residual)
+        factor = triangle(jacobian)
+        alone = self._alone(self.start, ones, jacobian, factor, residual)
         if alone is None:
-            return ones, None
+            return ones, None, (ones, factor)
         freedom = alone[1] if self.equations.machines.unknowns else None
-        return self._kept(ones * self._scored(alone)[0], ones), freedom
+        noise = self._kept(ones * self._scored(alone)[0], ones)
+        grown = common(noise)
+        if grown is not None:
+            jacobian /= grown
+            self.search.keep(self.start, noise, jacobian)
+        return noise, freedom, (ones, factor)
 
     def _alone(
         self,
         evaluation: Evaluation,
         noise: FloatArray,
         jacobian: FloatArray,
+        factor: FloatArray,
         residual: FloatArray,
     ) -> Shares | None:
         """Return the residual of each group that no parameters explain, without the prior's help.
 
-        None where too few equations are left to show it.
+        `factor` is one of the Jacobian. None where too few equations are left to show it.
         """
-        taken = column_basis(jacobian)
+        taken = column_basis(jacobian, factor)
         left = residual - taken @ (taken.T @ residual)
         every = np.ones(len(self.equations.blocks.components))
         shares = self.equations.by_groups(evaluation, noise, every, left, taken)
@@ -202,43 +213,50 @@ class Estimator:
         worst: float,
         last: Estimate | None = None,
         fitted: bool = False,
+        known: Known | None = None,
     ) -> IterationState:
         """Split the directions for this noise, before or after a fit; `last` is the last estimate.
 
-        `worst` is that of `IterationState`.
+        `worst` is that of `IterationState`; `known` is R at the start for another noise.
         """
         size = self.start.robot.length
         kept, noise_known = worst, fitted or not self.unstated.any() or worst < size
         worst = worst if noise_known else np.inf
-        first = self._decomposed(self.start, noise, last, None if last is None else last.state)
+        first, factor = self._at_start(noise, None if last is None else last.state, known)
         now: tuple[Decomposed | None, Decomposed | None] = (None, None)
         if fitted and last is not None:
-            now = self._decomposed(last.evaluation, noise, last)
+            known = last.state.noise, last.triangle
+            now = self._decomposed(last.evaluation, self._triangle(last.evaluation, noise, known))
         measured = directions(first[0], now[0], size)
         determined = directions(first[1], now[1], size)
         wanted = directions(first[1], now[1], size, worst)
         freedom = None if last is None else last.state.first_freedom
-        return IterationState(noise, loss, measured, determined, wanted, kept, first, freedom)
+        return IterationState(
+            noise, loss, measured, determined, wanted, kept, first, factor, freedom
+        )
+
+    def _at_start(
+        self, noise: FloatArray, last: IterationState | None, known: Known | None
+    ) -> tuple[tuple[Decomposed, Decomposed], FloatArray]:
+        """Decompose the start, and return its R.
+
+        `last` has both for another noise, `known` has R alone.
+        """
+        if last is not None:
+            known = last.noise, last.start_triangle
+            if (noise == last.noise).all():
+                return last.at_start, last.start_triangle
+        factor = self._triangle(self.start, noise, known)
+        grown = None if last is None else common(noise / last.noise)
+        if last is None or grown is None or self._priors:
+            return self._decomposed(self.start, factor), factor
+        singular, basis = last.at_start[0]
+        return ((singular / grown, basis),) * 2, factor
 
     def _decomposed(
-        self,
-        evaluation: Evaluation,
-        noise: FloatArray,
-        last: Estimate | None,
-        known: IterationState | None = None,
+        self, evaluation: Evaluation, factor: FloatArray
     ) -> tuple[Decomposed, Decomposed]:
-        """Decompose without and with the prior.
-
-        `last` is the last estimate, `known` the state with that of the start for another noise.
-        """
-        if known is not None:
-            factors = noise / known.noise
-            if (factors == 1.0).all():
-                return known.at_start
-            if not self._priors and (factors == factors[0]).all():
-                singular, basis = known.at_start[0]
-                return ((singular / factors[0], basis),) * 2
-        factor = self._triangle(evaluation, noise, last)
+        """Decompose R without and with the prior."""
         if not self._priors:
             data = decompose(factor)
             return data, data
@@ -248,15 +266,14 @@ class Estimator:
         return decompose(factor, *stated), decompose(factor, prior)
 
     def _triangle(
-        self, evaluation: Evaluation, noise: FloatArray, last: Estimate | None
+        self, evaluation: Evaluation, noise: FloatArray, known: Known | None
     ) -> FloatArray:
-        """R of the Jacobian, made of that of the last estimate where all noise has grown alike."""
-        if last is not None and last.evaluation is evaluation:
-            factors = noise / last.state.noise
-            if (factors == factors[0]).all():
-                grown: FloatArray = last.triangle / factors[0]
-                return grown
-        return self.search.triangle(evaluation, noise)
+        """R of the Jacobian, made of what is known of it where all noise has grown alike."""
+        grown = None if known is None else common(noise / known[0])
+        if known is None or grown is None:
+            return self.search.triangle(evaluation, noise)
+        factor: FloatArray = known[1] / grown
+        return factor
 
     def _fewer(self, state: IterationState, revised: IterationState) -> IterationState | None:
         """The state to begin again with after a search without an end; None where there is none.
@@ -291,7 +308,11 @@ class Estimator:
         alone = None
         if self._priors:
             alone = self._alone(
-                estimate.evaluation, estimate.state.noise, estimate.design, estimate.residual
+                estimate.evaluation,
+                estimate.state.noise,
+                estimate.design,
+                estimate.triangle @ estimate.basis,
+                estimate.residual,
             )
         return self._scored(estimate.shares if alone is None else alone)
 
@@ -340,12 +361,11 @@ class Estimator:
 
     def _common_factor(self, old: IterationState, new: IterationState) -> float | None:
         """Return the common factor of all groups' noise, as if nothing else distinguished a fit."""
-        factors = new.noise / old.noise
-        factor = float(factors[0])
+        factor = common(new.noise / old.noise)
         if self.loss != "linear" or old.determined.rank != new.determined.rank:
             return None
         alone = not (self._priors or self.equations.machines.unknowns)
-        return factor if (factors == factor).all() and (factor == 1.0 or alone) else None
+        return factor if factor == 1.0 or alone else None
 
     def scaled_triangle(self, evaluation: Evaluation) -> FloatArray:
         """R of the scaled Jacobian, not whitened: mm per mm, angles as their arc.
@@ -362,20 +382,30 @@ class Estimator:
                 factor = triangle(factor, self.equations.whitening.stacked(part, i, rows))
         return factor
 
-    def _estimate(self, trail: Trail, state: IterationState) -> Estimate:
-        """The statistics where a search has come to."""
+    def _estimate(
+        self, trail: Trail, state: IterationState, last: Estimate | None = None
+    ) -> Estimate:
+        """The statistics where a search has come to; `last` are those for another noise."""
         evaluation = trail.here
-        design = self.search.own_jacobian(evaluation, state.noise)
+        linear = self.loss == "linear"
         residual = self.equations.residual(evaluation, state.noise)
         weights = state.loss.weights(residual)
         root = np.sqrt(np.repeat(weights, self.equations.blocks.components))
-        linear = self.loss == "linear"
-        factor = triangle(design)
+        same = linear and last is not None and last.evaluation is evaluation
+        grown = common(state.noise / last.state.noise) if same and last is not None else None
+        if grown is None or last is None:
+            design = self.search.own_jacobian(evaluation, state.noise)
+            factor = triangle(design)
+        else:
+            factor = last.triangle / grown
         weighted = factor if linear else triangle(root[:, None] * design)
         prior = self.search.prior(evaluation.theta)
         half = unit_basis(weighted, prior, state.determined.identifiable)
         basis = np.hstack([half, state.determined.unidentifiable])
-        multiply_in_place(design, basis)
+        if grown is None or last is None:
+            multiply_in_place(design, basis)
+        else:
+            design = last.change(basis / grown)
         taken = design[:, : state.fitted.rank]
         shares = self.equations.by_groups(
             evaluation,
@@ -398,3 +428,9 @@ class Estimator:
             trail.evaluations,
             trail.history,
         )
+
+
+def common(factors: FloatArray) -> float | None:
+    """Return the factor (G,) of all groups; None where they have different ones."""
+    first = float(factors[0])
+    return first if (factors == first).all() else None

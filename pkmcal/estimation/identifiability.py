@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import itertools
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,8 +18,10 @@ from pkmcal.statistics.singular_values import svd
 
 _KINDS = 4  # kinds of parameters whose combinations are looked for
 # Nuisance parameters: one kind each, however many there are. A kind more is many combinations more.
-_NUISANCE = re.compile(r"(frame|target|anchor|tool|mounting|touch|run)\d*\.")
+# Points that have names of their own are of it, too: targetA, targetB.
+_NUISANCE = re.compile(r"(frame|target|anchor|tool|mounting|touch|run)[^.]*\.")
 _OUTSIDE = 1e-5  # share of a combination outside some parameters that does not count
+_TOGETHER = 512  # supports that are looked at at once
 _ALIKE = 1e-3  # share by which entries of a combination differ that are not equal
 _SURE = 6  # decimals of a coefficient that are more than rounding
 _LEAST = 0.01  # coefficient that is printed
@@ -192,12 +194,11 @@ def sparse_basis(unidentifiable: FloatArray, names: Sequence[str]) -> FloatArray
     parts = np.zeros((len(unidentifiable), 0))
     spans: list[set[int]] = []  # kinds among which each part was found
     shares = [unidentifiable[of].T @ unidentifiable[of] for of in member.T]
-    few = (itertools.combinations(range(len(kinds)), k) for k in range(1, _KINDS + 1))
-    for support in [*itertools.chain.from_iterable(few), range(len(kinds))]:
+    for support, dimension in _supports(np.array(shares)):
         if found.shape[1] == d:
             break
         within = sum(span <= {*support} for span in spans)
-        if within == _dimension(shares, support):
+        if within == dimension:
             continue
         away = ~member[:, list(support)].any(axis=1)
         _, singular, rows = np.linalg.svd(np.vstack([unidentifiable[away], np.zeros((d, d))]))
@@ -216,14 +217,21 @@ def sparse_basis(unidentifiable: FloatArray, names: Sequence[str]) -> FloatArray
     return parts
 
 
-def _dimension(shares: Sequence[FloatArray], support: Sequence[int]) -> int:
-    """Return the largest number of combinations almost wholly within some kinds of parameters.
+def _supports(shares: FloatArray) -> Iterator[tuple[Sequence[int], int]]:
+    """Yield supports of few kinds, then that of all, and how many combinations each has at most.
 
-    By eigenvalues, which are the squares of what is outside: quicker than the singular values, of
-    which they have half the digits. A few supports of thousands have any.
+    That is how many combinations have next to nothing outside of it, by the `shares` (k, d, d) of
+    the kinds. It is told by eigenvalues, which are the squares of what is outside: quicker than the
+    singular values, of which they have half the digits. A few supports of thousands have any.
     """
-    outside = np.eye(len(shares[0])) - sum(shares[k] for k in support)
-    return int(np.count_nonzero(np.linalg.eigvalsh(outside) <= 1.001 * _OUTSIDE**2))
+    kinds = len(shares)
+    for size in (*range(1, min(_KINDS, kinds) + 1), kinds):
+        several = itertools.combinations(range(kinds), size)
+        while some := [*itertools.islice(several, _TOGETHER)]:
+            inside = sum(shares[list(each)] for each in zip(*some, strict=True))
+            outside = np.linalg.eigvalsh(np.eye(shares.shape[1]) - inside)
+            dimensions = np.count_nonzero(outside <= 1.001 * _OUTSIDE**2, axis=1)
+            yield from zip(some, dimensions.tolist(), strict=True)
 
 
 def _reduced(basis: FloatArray) -> FloatArray:

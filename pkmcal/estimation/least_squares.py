@@ -141,8 +141,12 @@ class Search:
             It does not exist, at a singularity of the machine.
         """
         found = self.own_jacobian(evaluation, noise)
-        self._cache["jacobian"] = evaluation, noise, found
+        self.keep(evaluation, noise, found)
         return found
+
+    def keep(self, evaluation: Evaluation, noise: FloatArray, jacobian: FloatArray) -> None:
+        """Know the Jacobian there until another is asked for; who gives it leaves it as it is."""
+        self._cache["jacobian"] = evaluation, noise, jacobian
 
     def own_jacobian(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
         """Return `jacobian` in memory of its own, which the caller may change."""

@@ -26,7 +26,7 @@ from pkmcal.fitted.nuisances import in_result, nuisances
 from pkmcal.kinematics.robot import Robot
 from pkmcal.statistics.distributions import t_factor
 from pkmcal.statistics.linear_fit import triangle
-from pkmcal.statistics.prior_test import LEAST_FREEDOM, PriorTest, data_alone, prior_test
+from pkmcal.statistics.prior_test import LEAST_FREEDOM, PriorTest, left_alone, prior_test
 
 _INVOLVED = 1e-6  # share of a parameter in unidentifiable combinations from which it is one
 
@@ -201,13 +201,15 @@ def tested_prior(
     left = chosen.prior_left(estimate.evaluation.theta)
     centre = known @ left[mine]
     data = estimate.residual - estimate.change(centre)
+    few = triangle([estimate.design, data])  # turned rows, which say what all of them say
     variance, freedom = 1.0, np.inf
     if estimator.unstated.any():
-        squares, freedom = data_alone(estimate.design, data)
+        squares, freedom = left_alone(few, len(data))
         if freedom < LEAST_FREEDOM:
             return None
         variance = squares / freedom
-    columns = [estimate.change(known), estimate.change(rest), data]
+    design, left_over = few[:, :-1], few[:, -1]
+    columns = [estimate.change(known, design), estimate.change(rest, design), left_over]
     if len(others):
         beside = [others @ known, others @ rest, left[~mine] - others @ centre]
         sigma = np.sqrt(variance)

@@ -4,21 +4,26 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from typing import TypeVar
 
+from pkmcal.arms.arm import SerialArm
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.number_text import typed
 from pkmcal.geometry.carried import Load
+from pkmcal.geometry.yielding import elastic_numbers
 from pkmcal.jobs.rows import numbers_on_line
 from pkmcal.kinematics.robot import Robot
 
+Machine = TypeVar("Machine", Robot, SerialArm)
 _MASSES = {"": 1.0, "kg": 1.0, "g": 1e-3, "t": 1e3, "lb": 0.45359237}  # kg
+_SOFTEST = 1.0  # mm/N: 1 kg moves the number by 1 cm
 _MASS = re.compile(r"(.*?)\s*([a-z]*)")
 _TOOL = re.compile(r"[Tt]?(\d+)\s*=([^,]*)(?:,(.*))?", re.ASCII)
 
 
 def carrying(
-    robot: Robot, payload: str | None, payload_at: str | None, tool_force: str | None
-) -> Robot:
+    robot: Machine, payload: str | None, payload_at: str | None, tool_force: str | None
+) -> Machine:
     """The robot with the payload of the options; itself without any."""
     if payload is None and payload_at is None and tool_force is None:
         return robot
@@ -29,7 +34,14 @@ def carrying(
         three("--payload-at", payload_at),
         three("--tool-force", tool_force),
     )
-    return robot.carrying(load)
+    if isinstance(robot, Robot):
+        return robot.carrying(load)
+    if robot.laws is None or not robot.laws.yielding:
+        raise ArgumentError(
+            f"robot: {robot.name} is an arm of which nothing yields to a payload: its file states no"
+            " stiffness of a joint"
+        )
+    return robot.under(load)
 
 
 def loads_by_tool(texts: list[str] | None) -> dict[int, Load]:
@@ -49,16 +61,37 @@ def loads_by_tool(texts: list[str] | None) -> dict[int, Load]:
 def yielding(robot: Robot, compliances: Sequence[str] | None) -> Robot:
     """The robot with what the options say that yields."""
     found: dict[str, float] = {}
+    by: dict[str, str] = {}  # the pattern that a number was named with
     for text in compliances or ():
         for part in text.split(","):
-            name, equals, value = part.partition("=")
+            pattern, equals, value = (each.strip() for each in part.partition("="))
             try:
-                found[name.strip()] = typed(value)
+                given = typed(value)
             except ValueError:
                 equals = ""
             if not equals:
                 raise ArgumentError(f"--compliance must be NAME=C, found {part!r}")
+            for name in elastic_numbers(robot.model, pattern):
+                if name in by:
+                    twice = pattern if pattern == by[name] else f"{by[name]} and {pattern}"
+                    raise ArgumentError(f"--compliance states {name} twice, by {twice}")
+                by[name] = pattern
+            _require_compliance(pattern, given)
+            found[pattern] = given
     return robot.yielding(found) if found else robot
+
+
+def _require_compliance(pattern: str, value: float) -> None:
+    """Refuse what is no compliance of a machine: none at all, or a stiffness."""
+    if value == 0.0:
+        raise ArgumentError(
+            f"--compliance {pattern} is 0: what does not yield is left out; found {value:g}"
+        )
+    if value > _SOFTEST:
+        raise ArgumentError(
+            f"--compliance {pattern} is {value:g} mm/N or rad/(N mm), softer than any machine: if"
+            f" that is a stiffness in N/mm, its compliance is {1.0 / value:.4g}"
+        )
 
 
 def mass(option: str, text: str) -> float:

@@ -20,6 +20,7 @@ ROUNDING = 1e-9  # a singular value below this share of the largest is zero
 _WHOLE = 9  # decimals from which degrees of freedom are whole: limits on them are
 _IN_ONE_THREAD = 8192  # numbers
 _COLUMNS_AT_ONCE = 32  # of a factorisation
+_FEW_COLUMNS = 4  # of one with many columns
 _KEYS = 4096  # of rows that are added up at once
 
 
@@ -212,9 +213,10 @@ def alike(key: IntArray, most: int) -> Iterator[IntArray]:
             yield order[of_size[lot]]
 
 
-def column_basis(matrix: FloatArray) -> FloatArray:
-    """Orthonormal basis (M, r) of the columns."""
-    basis: FloatArray = matrix @ orthonormal(matrix)
+def column_basis(matrix: FloatArray, factor: FloatArray | None = None) -> FloatArray:
+    """Orthonormal basis (M, r) of the columns; `factor` is the matrix's, where it is known."""
+    turn = orthonormal(matrix) if factor is None else _orthonormal(factor)
+    basis: FloatArray = matrix @ turn
     return basis
 
 
@@ -223,7 +225,12 @@ def orthonormal(matrix: FloatArray | Sequence[FloatArray]) -> FloatArray:
 
     The matrix may be several side by side.
     """
-    _, singular, rows = svd(triangle(matrix))
+    return _orthonormal(triangle(matrix))
+
+
+def _orthonormal(factor: FloatArray) -> FloatArray:
+    """`orthonormal` of a matrix with this factor (k, n): the same AᵀA."""
+    _, singular, rows = svd(factor)
     keep = singular > ROUNDING * singular[0]
     found: FloatArray = rows[keep].T / singular[keep]
     return found
@@ -251,20 +258,26 @@ def triangle(*stacked: FloatArray | Sequence[FloatArray]) -> FloatArray:
     A consists of matrices below each other, each one matrix or several side by side.
 
     Rows enter in blocks so small that the linear algebra library does not spread them over
-    threads, which on a busy computer takes a hundred times as long as the work itself. LAPACK is
-    called directly: around small blocks NumPy takes five times as long.
+    threads, which on a busy computer takes a hundred times as long as the work itself, and makes
+    the last bits depend on how many there are. LAPACK is called directly: around small blocks
+    NumPy takes five times as long. Where columns are so many that no block would be small, rows
+    join a factor by few columns at a time.
     """
-    from scipy.linalg.lapack import dgeqrf
+    from scipy.linalg.lapack import dgeqrf, dtpqrt
 
     matrices = ([each] if isinstance(each, np.ndarray) else each for each in stacked)
     below = [[p[:, None] if p.ndim == 1 else p for p in parts] for parts in matrices]
     n = sum(part.shape[1] for part in below[0])
     block = max(n, _IN_ONE_THREAD // max(n, 1) - n)
+    wide = n * (n + block) > _IN_ONE_THREAD
     factor: FloatArray = np.zeros((0, n))
     for beside in below:
         for start in range(0, len(beside[0]), block):
             rows = [part[start : start + block] for part in beside]
             whole = rows[0] if len(rows) == 1 else np.concatenate(rows, axis=1)
+            if wide and len(factor) == n:
+                factor = dtpqrt(0, _FEW_COLUMNS, factor, whole)[0]
+                continue
             whole = np.concatenate([factor, whole]) if len(factor) else whole
             factor = dgeqrf(whole, lwork=_COLUMNS_AT_ONCE * n or 1)[0][:n]
             factor[_below(*factor.shape)] = 0.0

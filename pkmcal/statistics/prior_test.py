@@ -67,12 +67,16 @@ def data_alone(jacobian: FloatArray, data: FloatArray) -> tuple[float, float]:
     data : ndarray (M,)
         Residuals at the expansion point.
     """
-    factor = triangle([jacobian, data])
-    n = jacobian.shape[1]
+    return left_alone(triangle([jacobian, data]), len(data))
+
+
+def left_alone(factor: FloatArray, count: int) -> tuple[float, float]:
+    """`data_alone` of `count` rows by the triangular factor of Jacobian and data, side by side."""
+    n = factor.shape[1] - 1
     basis, singular, _ = svd(factor[:, :n])
     basis = basis[:, singular > ROUNDING * singular[0]]
     rest = factor[:, n] - basis @ (basis.T @ factor[:, n])
-    return float(rest @ rest), float(len(data) - basis.shape[1])
+    return float(rest @ rest), float(count - basis.shape[1])
 
 
 def prior_test(

@@ -96,6 +96,12 @@ def test_program_is_corrected_for_the_load_of_each_tool(
         (("stiffness", "hexapod"), "nothing of hexapod yields"),
         (("stiffness", "hexapod", "--compliance", "offset*=1e-4", "--cut", "1"), "--cut"),
         (("stiffness", "hexapod", "--compliance", "offset1"), "--compliance must be NAME=C"),
+        (
+            ("stiffness", "hexapod", "--compliance", "offset*=1e-4,offset2=2e-4"),
+            "offset2 twice, by offset* and offset2",
+        ),
+        (("stiffness", "hexapod", "--compliance", "offset*=0"), "what does not yield is left out"),
+        (("stiffness", "hexapod", "--compliance", "offset*=2e4"), "its compliance is 5e-05"),
         (("forward", "3r", "0,0,0", "--payload", "5"), "carries no payload here"),
     ],
 )

@@ -119,6 +119,11 @@ def test_a_header_says_where_a_machine_gives_way(tmp_path: Path) -> None:
     assert status == 6 and np.array_equal(after, pose)
     status, after = run(library.inverse, pose, np.full(10, np.nan), q)
     assert status == 4 and np.array_equal(after, q)
+    row[0] = -5.0  # kg
+    status, after = run(library.inverse, pose, row, q)
+    assert status == 4 and np.array_equal(after, q)
+    status, after = run(library.forward, q, row, pose)
+    assert status == 4 and np.array_equal(after, pose)
 
 
 def test_what_a_header_does_not_hold_is_said(tmp_path: Path) -> None:

@@ -156,3 +156,14 @@ def test_numbers_of_one_set_up_are_one_kind_however_many_they_are() -> None:
     risen, moved = [1.0, 0, *[1] * 6], [1.0, 1, *[0] * 6]
     basis = sparse_basis(np.linalg.qr(np.column_stack([risen, moved])).Q, names)
     assert sorted(map(tuple, np.abs(basis.T).round(9))) == sorted(map(tuple, [risen, moved]))
+
+
+def test_points_with_names_are_of_one_kind_as_numbered_ones_are() -> None:
+    rng = np.random.default_rng(3)
+    open_ones, _ = np.linalg.qr(rng.normal(size=(18, 5)))
+    machine = [f"{kind}1" for kind in ("offset", "rod", "gain", "base", "zero", "tilt")]
+    numbered, named = (
+        [*machine, *(f"target{target}.{axis}" for target in targets for axis in "xyz")]
+        for targets in ("1234", "ABCD")
+    )
+    np.testing.assert_array_equal(sparse_basis(open_ones, numbered), sparse_basis(open_ones, named))
