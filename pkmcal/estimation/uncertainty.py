@@ -201,7 +201,9 @@ class Uncertainty:
         """Variances of an equation in units of what it was whitened by."""
         if self.equations.blocks.unstated.any() or self.fit.freedom >= FEW:
             sandwich = self.covariance.sandwich
-            return noise(sandwich.residual, sandwich.retained, self.fit.key)
+            total, shared = noise(sandwich.residual, sandwich.retained, self.fit.key)
+            shown = 1.0 - self.fit.exact / float(sandwich.retained.sum())
+            return total / shown, shared / shown
         return 1.0, 0.0
 
     def noise_of(self, i: int, family: int = 0) -> Noise:
@@ -212,9 +214,12 @@ class Uncertainty:
     def _noise(self, i: int, family: int) -> Noise:
         stated = self.stated_variances(i, family)
         if self.mixed:
-            own = float(self.factors[i] ** 2 if stated is None else stated.mean())
-            shown = self.equations.table.sets[i].components and not self.unknown[i]
-            return own * self.excess[0] if shown else float("nan"), 0.0
+            families = self.equations.table.sets[i].instrument.families
+            if not families:
+                return float("nan"), 0.0
+            group = self.equations.whitening.groups[i][families[family].columns[0]]
+            own = float(self.factors[group] ** 2 if stated is None else stated.mean())
+            return float("nan") if self.unknown[group] else own * self.excess[0], 0.0
         if stated is not None and self.fit.freedom < FEW:
             return float(stated.mean()), 0.0
         mine = self.family_of(i, family) if family else self.lengths_of(i)
@@ -330,7 +335,7 @@ def solved(estimator: Estimator, estimate: Estimate) -> LinearModel:
         back = unit_basis(estimate.triangle, estimate.prior, state.determined.identifiable)
         design = estimate.change(back)
     fit = in_unit_basis(design, residual, estimate.prior, back, named.pose, named.component)
-    return named, fit
+    return named, replace(fit, exact=estimate.exact_freedom)
 
 
 def _prior_residual(estimator: Estimator, estimate: Estimate) -> FloatArray:

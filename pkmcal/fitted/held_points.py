@@ -45,9 +45,6 @@ class HeldFamily:
         without the points that are off.
     test : HoldoutTest or None
         Whether they contradict the fit; None where their noise is not known.
-    together : HoldoutTest or None
-        That of all families at once, where only their common noise is known: the readings have no
-        sigma, and residuals of mixtures do not show how it divides among the families.
     """
 
     family: Family
@@ -55,13 +52,11 @@ class HeldFamily:
     expected: float
     rms_without_outliers: float
     test: HoldoutTest | None
-    together: HoldoutTest | None = None
 
     @property
     def contradicts(self) -> bool:
         """Whether they contradict the fit, a few points that are off among them."""
-        tests = (self.test, self.together) if self.together is not None else (self.test,)
-        return all(each is not None and each.contradicts for each in tests)
+        return self.test is not None and self.test.contradicts
 
     @property
     def agrees_otherwise(self) -> bool:
@@ -284,10 +279,6 @@ def families(
             return float("nan")
         return float(np.sqrt((squares / points.arc**2)[of].sum() / count))
 
-    several = [mine for _, whole in _each_unit(points) if (mine := whole & good).any()]
-    together = None
-    if len(several) > 1 and uncertainty.mixed and _without_sigma(points, uncertainty):
-        together = _test(points, named, np.logical_or.reduce(several), uncertainty)
     for unit, whole in _each_unit(points):
         if not (mine := whole & good).any():
             continue
@@ -297,14 +288,7 @@ def families(
             expected=rms(points.own + by_fit, mine),
             rms_without_outliers=rms(points.residual**2, mine & ~odd),
             test=_test(points, named, mine, uncertainty),
-            together=together,
         )
-
-
-def _without_sigma(points: Points, uncertainty: Uncertainty) -> bool:
-    """Whether some of the fitted sets that these are like state no sigma."""
-    sets = uncertainty.equations.table.sets
-    return any(stated_variances(sets[i]) is None for i in set(points.like[points.known].tolist()))
 
 
 def _test(
@@ -343,7 +327,7 @@ def _fitted(uncertainty: Uncertainty, sets: IntArray, family: IntArray) -> tuple
     unit = np.zeros(len(uncertainty.fit.residual))
     if uncertainty.mixed:
         values = sandwich.residual
-        unit[:] = np.sqrt(uncertainty.excess[0])
+        unit[:] = np.sqrt((values**2).sum() / sandwich.retained.sum())
     else:
         values = uncertainty.adjusted
         for i, there in sorted(set(zip(sets.tolist(), family.tolist(), strict=True))):

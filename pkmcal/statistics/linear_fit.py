@@ -41,6 +41,8 @@ class LinearFit:
         Which equations may share an error: those of one pose have one number, from 0.
     component : ndarray of int (M,)
         Which may share the same: x, y, z, …, by number.
+    exact : float
+        Degrees of freedom of equations that are met exactly: these show no noise of the others.
     """
 
     design: FloatArray
@@ -49,6 +51,7 @@ class LinearFit:
     back: FloatArray
     cluster: IntArray
     component: IntArray
+    exact: float = 0.0
 
     @cached_property
     def leverage(self) -> FloatArray:
@@ -58,8 +61,8 @@ class LinearFit:
 
     @property
     def freedom(self) -> float:
-        """Equations less the parameters that went into them."""
-        return round(float(len(self.residual) - self.leverage.sum()), _WHOLE)
+        """Equations less the parameters that went into them, and less those met exactly."""
+        return round(float(len(self.residual) - self.leverage.sum()) - self.exact, _WHOLE)
 
     @property
     def squares(self) -> float:
