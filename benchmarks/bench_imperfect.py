@@ -19,7 +19,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import pkmcal as pk
-from benchmarks.imperfect import models, outsider, readings, rows, sound  # noqa: F401  # they add scenarios
+from benchmarks.imperfect import (  # noqa: F401  # they add scenarios
+    beside_sigma,
+    models,
+    outsider,
+    readings,
+    rows,
+    sound,
+)
 from benchmarks.imperfect.cases import SCENARIOS, Case, Meant, numbers
 from benchmarks.timing import Report
 
@@ -83,7 +90,8 @@ def judged(name: str, number: int) -> Draw:
 def errors(case: Case, found: Any) -> tuple[float, bool]:
     """True error of the calibrated machine over the stated one, and whether it grew."""
     if isinstance(case.robot, pk.SerialArm):
-        at = np.random.default_rng(0).uniform(-1.2, 1.2, (PLACES, 6))
+        joints = len(case.robot.joint_errors)
+        at = np.random.default_rng(0).uniform(-1.2, 1.2, (PLACES, joints))
         wanted = case.true.forward(at)[:, :3, 3]
         before, after = (
             rms(each.forward(at)[:, :3, 3] - wanted) for each in (case.robot, found.robot)

@@ -151,7 +151,7 @@ class Whitening:
         """
         rest = np.zeros(len(self.present))
         rest[self.present] = whitened
-        parts = []
+        parts: list[FloatArray] = []
         for white, groups in zip(self.white, self.groups, strict=True):
             rows, k = white.shape[:2]
             own, rest = np.split(rest, [rows * k])
@@ -159,7 +159,7 @@ class Whitening:
             if white.ndim == 3:
                 parts.append(np.linalg.solve(white, part[:, :, None])[:, :, 0])
             else:
-                parts.append(part / white)
+                parts.append(np.divide(part, white))
         return parts
 
     def variances(self, noise: FloatArray) -> FloatArray:
