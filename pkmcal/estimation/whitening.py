@@ -17,7 +17,7 @@ _TOGETHER = 16384  # rows that are whitened at once by matrices
 
 @dataclass(frozen=True, eq=False)
 class Whitening:
-    """What takes the readings of each set to units of their standard deviation.
+    """Whitening: it takes the readings of each set to units of their standard deviation.
 
     The `noise` (G,) of its methods multiplies the stated deviations of each group of components;
     groups beyond those of the sets have none here.
@@ -56,12 +56,12 @@ class Whitening:
         )
 
     def by_set(self) -> Whitening:
-        """All components of a set in one group."""
+        """Put all components of a set into one group."""
         groups = tuple(np.full(len(each), i) for i, each in enumerate(self.groups))
         return replace(self, groups=groups, set_of_group=np.arange(len(groups)))
 
     def by_family(self, sets: Sequence[Measurements]) -> Whitening:
-        """Lengths and angles of each set in groups of their own."""
+        """Put lengths and angles of each set into groups of their own."""
         groups, of_set = list[IntArray](), list[int]()
         for i, m in enumerate(sets):
             groups.append(np.empty(len(m.components), dtype=np.intp))
@@ -71,7 +71,7 @@ class Whitening:
         return replace(self, groups=tuple(groups), set_of_group=np.array(of_set, dtype=np.intp))
 
     def unstated(self, sets: Sequence[Measurements]) -> BoolArray:
-        """Whether the deviation of each group is not stated of what was read of it."""
+        """Return whether readings of each group have no stated deviation."""
         found = np.zeros(len(self.set_of_group), dtype=bool)
         for m, read, groups in zip(sets, self.read, self.groups, strict=True):
             if m.sigma is None:
@@ -79,24 +79,24 @@ class Whitening:
         return found
 
     def of_equations(self, groups: Sequence[IntArray]) -> IntArray:
-        """What stands beside each component (k,) of each set, of all that was read (M,)."""
+        """Return numbers of the components (k,) of each set for each reading (M,)."""
         whole = [np.tile(own, len(read)) for own, read in zip(groups, self.read, strict=True)]
         found: IntArray = np.concatenate(whole)[self.present]
         return found
 
     @cached_property
     def present(self) -> BoolArray:
-        """Which of all numbers of all sets were read, row by row."""
+        """Mark, row by row, which numbers of all sets were read."""
         return np.concatenate([read.reshape(-1) for read in self.read])
 
     @cached_property
     def complete(self) -> bool:
-        """Whether all numbers were read."""
+        """True if all numbers were read."""
         return bool(self.present.all())
 
     @cached_property
     def any_read(self) -> bool:
-        """Whether any number was read at all."""
+        """True if any number was read at all."""
         return bool(self.present.any())
 
     def reweighted(self, deviations: Sequence[FloatArray]) -> Whitening:
@@ -112,7 +112,7 @@ class Whitening:
         return self.whiten([np.array(part) for part in parts], noise)
 
     def whiten(self, parts: Sequence[FloatArray], noise: FloatArray) -> FloatArray:
-        """As `whitened`, in the memory of the parts: a Jacobian is large."""
+        """Whiten in place, as `whitened` does in new memory: a Jacobian is large."""
         for i, part in enumerate(parts):
             for rows in lots(len(part), _TOGETHER):
                 self._whiten(part[rows], i, rows, noise)
@@ -151,15 +151,16 @@ class Whitening:
         """
         rest = np.zeros(len(self.present))
         rest[self.present] = whitened
-        parts: list[FloatArray] = []
+        parts = list[FloatArray]()
         for white, groups in zip(self.white, self.groups, strict=True):
             rows, k = white.shape[:2]
             own, rest = np.split(rest, [rows * k])
-            part = np.multiply(noise[groups], own.reshape(rows, -1))
+            part = noise[groups] * own.reshape(rows, -1)
             if white.ndim == 3:
-                parts.append(np.linalg.solve(white, part[:, :, None])[:, :, 0])
+                part = np.linalg.solve(white, part[:, :, None])[:, :, 0]
             else:
-                parts.append(np.divide(part, white))
+                part = part / white
+            parts.append(np.asarray(part, dtype=np.float64))
         return parts
 
     def variances(self, noise: FloatArray) -> FloatArray:
@@ -191,5 +192,5 @@ def _whitening(measured: Measurements, length: float) -> FloatArray:
 
 
 def _same_turnings(sigma: FloatArray, first: int) -> bool:
-    """Whether standard deviations (N, k) are the same about every axis."""
+    """Return whether standard deviations (N, k) are the same about every axis."""
     return sigma.ndim == 2 and bool((sigma[:, first + 1 :] == sigma[:, first : first + 1]).all())
