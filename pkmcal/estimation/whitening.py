@@ -151,16 +151,16 @@ class Whitening:
         """
         rest = np.zeros(len(self.present))
         rest[self.present] = whitened
-        parts = list[FloatArray]()
+        parts: list[FloatArray] = []
         for white, groups in zip(self.white, self.groups, strict=True):
             rows, k = white.shape[:2]
             own, rest = np.split(rest, [rows * k])
             part = noise[groups] * own.reshape(rows, -1)
             if white.ndim == 3:
-                part = np.linalg.solve(white, part[:, :, None])[:, :, 0]
+                solved = np.linalg.solve(white, part[:, :, None])[:, :, 0]
+                parts.append(np.asarray(solved, dtype=np.float64))
             else:
-                part = part / white
-            parts.append(np.asarray(part, dtype=np.float64))
+                parts.append(part / white)
         return parts
 
     def variances(self, noise: FloatArray) -> FloatArray:
