@@ -27,7 +27,7 @@ from benchmarks.imperfect import (  # noqa: F401  # they add scenarios
     rows,
     silent,
     sound,
-    stated,
+    statements,
 )
 from benchmarks.imperfect.cases import SCENARIOS, Case, Meant, numbers
 from benchmarks.timing import Report

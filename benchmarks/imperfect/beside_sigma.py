@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -78,9 +77,3 @@ def gains_of_a_3rps(rng: np.random.Generator) -> Case:
     wrong = {f"gain{i}": 1.0 + 3e-4 * rng.normal() for i in (1, 2, 3)}
     true = true.replace(wrong)
     return stated(robot, true, q, true.forward(q, guess=poses).pose, rng)
-
-
-@scenario("other")
-def play_of_a_joint_not_stated(rng: np.random.Generator) -> Case:
-    case = play_of_a_joint(rng)
-    return replace(case, data=replace(case.data, sigma=None))

@@ -118,7 +118,8 @@ def tested(
     cell = np.zeros(len(row), dtype=np.intp)
     for mine in groups.values():
         cell = numbered(cell, mine[row].astype(np.intp))
-    few = few_equations(sure.fit.design, sure.fit.residual, use, key, cell, reach(sure))
+    fit = sure.of_own_deviations
+    few = few_equations(fit.design, fit.residual, use, key, cell, reach(sure, fit))
     first = np.unique(cell, return_index=True)[1]  # an equation of each cell
     every = {name: few.tested(mine[row][first][few.cell]) for name, mine in groups.items()}
     return {name: each for name, each in every.items() if each is not None}
@@ -132,7 +133,8 @@ def _in_no_order(found: Solution, visits: Visits, use: IntArray, key: IntArray) 
     chosen = chosen[:: max(1, -(-len(chosen) // _MOST))]
     among = np.isin(visit[use], chosen)
     use, key = use[among], key[among]
-    few = few_equations(sure.fit.design, sure.fit.residual, use, key, visit, reach(sure))
+    fit = sure.of_own_deviations
+    few = few_equations(fit.design, fit.residual, use, key, visit, reach(sure, fit))
     unit = numbered(few.cell)
     mine = best_division(few.design, few.residual, unit)
     width = few.design.shape[1]

@@ -8,7 +8,7 @@ spoil the others.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 
 import numpy as np
@@ -88,6 +88,18 @@ class LinearFit:
         idle = exact[~(self.design[use[exact]] != 0.0).any(axis=1)]
         kept: IntArray = np.delete(use, idle)
         return kept
+
+
+def reweighted(fit: LinearFit, deviations: FloatArray, prior_residual: FloatArray) -> LinearFit:
+    """Solve a fit again with other deviations (M,) of its equations, in units of the present ones.
+
+    `prior_residual` (q,) are the residuals of the prior's rows.
+    """
+    design, residual = fit.design / deviations[:, None], fit.residual / deviations
+    back = unit_basis(design, fit.prior, np.eye(design.shape[1]))
+    design, prior = design @ back, fit.prior @ back
+    residual = residual - design @ (design.T @ residual + prior.T @ prior_residual)
+    return replace(fit, design=design, residual=residual, prior=prior, back=fit.back @ back)
 
 
 def linear_fit(
