@@ -71,6 +71,8 @@ class Uncertainty:
         Whether these were cut, as far as the fit tells.
     prior_residual : ndarray (q,)
         Residuals of the prior's rows.
+    information : ndarray (G, G)
+        What the residuals inform of the noise of the groups: see `elimination.Shares`.
     considered : ndarray (p, k) or None
         How the basis follows numbers that are not fitted along, in their stated deviations.
     noise_share : float
@@ -88,6 +90,7 @@ class Uncertainty:
     coarse: tuple[Coarse, ...]
     cut: tuple[Cut, ...]
     prior_residual: FloatArray
+    information: FloatArray
     considered: FloatArray | None = None
     noise_share: float = 1.0
 
@@ -198,6 +201,16 @@ class Uncertainty:
     def _place(self) -> IntArray:
         """Component of its row for each equation (M,)."""
         return component_of(self.equations)
+
+    def freedom_of_noise(self, shares: FloatArray) -> float:
+        """Degrees of freedom of a variance of which groups make these shares (G,).
+
+        inf where all of them are stated.
+        """
+        mine = self.equations.blocks.unstated & (shares > 0.0)
+        known = self.information[np.ix_(mine, mine)]
+        spread = float(shares[mine] @ np.linalg.lstsq(known, shares[mine], rcond=None)[0])
+        return 1.0 / spread if spread > 0.0 else float("inf")
 
     @cached_property
     def noises(self) -> tuple[Noise, ...]:
@@ -340,6 +353,7 @@ def uncertainty(
         coarse=coarse,
         cut=tuple(cut_readings(equations, named, fit, state.noise, coarse)),
         prior_residual=beyond,
+        information=estimate.shares[2],
     )
 
 

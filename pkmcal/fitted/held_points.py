@@ -315,7 +315,26 @@ def _test(
     common = shared + float(np.mean(points.by_actuators[good] / own)) * total
     of_held = total, min(common, total)
     taken = float(points.taken[good].mean())
-    return holdout_test(fitted, held, split, covariance, of_held, taken)
+    most = _freedom_of_noise(points, good, uncertainty)
+    return holdout_test(fitted, held, split, covariance, of_held, taken, most)
+
+
+def _freedom_of_noise(points: Points, good: BoolArray, uncertainty: Uncertainty) -> float:
+    """Degrees of freedom of the noise of some equations (M,), of mixtures; else inf.
+
+    Residuals of mixtures are of all groups in part: what they say of one of these is less than
+    their number.
+    """
+    if not uncertainty.mixed:
+        return float("inf")
+    whitening = uncertainty.equations.whitening
+    shares = np.zeros(len(uncertainty.factors))
+    for like, family in set(zip(points.like[good], points.family[good], strict=True)):
+        mine = good & (points.like == like) & (points.family == family)
+        columns = uncertainty.equations.table.sets[like].instrument.families[family].columns
+        shares[whitening.groups[like][columns[0]]] += points.reading[mine].sum()
+    shares[-1] += points.by_actuators[good].sum()
+    return uncertainty.freedom_of_noise(shares / shares.sum())
 
 
 def _fitted(uncertainty: Uncertainty, sets: IntArray, family: IntArray) -> tuple[Lengths, Noise]:

@@ -104,6 +104,7 @@ def holdout_test(
     covariance: FloatArray,
     of_held: Noise | None = None,
     taken: float = 0.0,
+    most: float = np.inf,
 ) -> HoldoutTest:
     """Compare.
 
@@ -119,13 +120,15 @@ def holdout_test(
         That of `held`, where its errors share another part of the same variance.
     taken : float
         Share of the equations of `held` that numbers found from these took.
+    most : float
+        Degrees of freedom of the variance of the errors, where these are fewer than the residuals'.
     """
     expected = split[0] + float(
         np.einsum("ij,jk,ik->", held.design, covariance, held.design)
     ) / len(held.residual)
     ratio = float(np.sqrt(np.mean(held.residual**2) / expected))
     first = _of_sum(held, of_held or split, covariance) * (1.0 - taken)
-    second = _of_residuals(fitted, split)
+    second = min(_of_residuals(fitted, split), most)
     poses = np.bincount(fitted.pose)
     squares = np.bincount(fitted.pose, fitted.residual**2)[poses > 0] / poses[poses > 0]
     if len(squares) > 2 and (spread := float(squares.var(ddof=1))) > 0:
