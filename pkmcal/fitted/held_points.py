@@ -279,15 +279,15 @@ def families(
             return float("nan")
         return float(np.sqrt((squares / points.arc**2)[of].sum() / count))
 
-    for unit, whole in _each_unit(points):
-        if not (mine := whole & good).any():
-            continue
+    several = [(unit, mine) for unit, whole in _each_unit(points) if (mine := whole & good).any()]
+    for unit, mine in several:
+        test = _test(points, named, mine, uncertainty)
         yield HeldFamily(
             family=Family(unit),
             rms=rms(points.residual**2, mine),
             expected=rms(points.own + by_fit, mine),
             rms_without_outliers=rms(points.residual**2, mine & ~odd),
-            test=_test(points, named, mine, uncertainty),
+            test=None if test is None else replace(test, of=len(several)),
         )
 
 

@@ -36,12 +36,15 @@ class HoldoutTest:
         How likely a ratio as large would be if fit, noise and covariance were right.
     freedom : (float, float)
         Degrees of freedom of the F test.
+    of : int
+        How many such tests are made of the points.
     """
 
     ratio: float
     median_ratio: float
     chance: float
     freedom: tuple[float, float]
+    of: int = 1
 
     @property
     def contradicts(self) -> bool:
@@ -51,7 +54,7 @@ class HoldoutTest:
     @property
     def least_ratio(self) -> float:
         """Ratio of rms to what is expected from which the points can contradict the fit."""
-        return max(RATIO, float(np.sqrt(f_limit(CHANCE, *self.freedom))))
+        return max(RATIO, float(np.sqrt(f_limit(CHANCE / self.of, *self.freedom))))
 
     @property
     def chance_nearer(self) -> float:
@@ -62,12 +65,12 @@ class HoldoutTest:
     @property
     def nearer(self) -> bool:
         """True if the points are nearer than noise and covariance let expect."""
-        return self.ratio < 1.0 / RATIO and self.chance_nearer < NEARER
+        return self.ratio < 1.0 / RATIO and self.chance_nearer < NEARER / self.of
 
     @property
     def few_off(self) -> bool:
         """True if the rms alone contradicts the fit, which a few points can cause."""
-        return self.chance < CHANCE and self.ratio > RATIO
+        return self.chance < CHANCE / self.of and self.ratio > RATIO
 
 
 @dataclass(frozen=True, eq=False)
