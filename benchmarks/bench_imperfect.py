@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import pkmcal as pk
-from benchmarks.imperfect import models, outsider, readings, rows, silent, sound, stated  # noqa: F401  # they add scenarios
+from benchmarks.imperfect import models, outsider, readings, rows, silent, sound, statements  # noqa: F401  # they add scenarios
 from benchmarks.imperfect.cases import SCENARIOS, Case, Meant, numbers
 from benchmarks.timing import Report
 
