@@ -19,7 +19,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import pkmcal as pk
-from benchmarks.imperfect import models, outsider, readings, rows, sound  # noqa: F401  # they add scenarios
+from benchmarks.imperfect import (  # noqa: F401  # they add scenarios
+    beside_sigma,
+    models,
+    outsider,
+    readings,
+    rows,
+    silent,
+    sound,
+    statements,
+)
 from benchmarks.imperfect.cases import SCENARIOS, Case, Meant, numbers
 from benchmarks.timing import Report
 
@@ -83,7 +92,7 @@ def judged(name: str, number: int) -> Draw:
 def errors(case: Case, found: Any) -> tuple[float, bool]:
     """True error of the calibrated machine over the stated one, and whether it grew."""
     if isinstance(case.robot, pk.SerialArm):
-        at = np.random.default_rng(0).uniform(-1.2, 1.2, (PLACES, 6))
+        at = np.random.default_rng(0).uniform(-1.2, 1.2, (PLACES, case.robot.n_joints))
         wanted = case.true.forward(at)[:, :3, 3]
         before, after = (
             rms(each.forward(at)[:, :3, 3] - wanted) for each in (case.robot, found.robot)
@@ -96,10 +105,13 @@ def errors(case: Case, found: Any) -> tuple[float, bool]:
 
 
 def missed(robot: Any, case: Case, poses: Any) -> float:
-    """How far the true machine goes from poses, commanded by another."""
+    """How far the true machine is from where another that is commanded to poses believes it is.
+
+    Fewer actuators than coordinates reach a part of these: the others follow.
+    """
     q = robot.inverse(poses, match=True if case.robot.model.match else None)
-    there = case.true.forward(q, guess=poses).pose
-    return rms(there[:, :3] - poses[:, :3])
+    there, meant = (each.forward(q, guess=poses).pose for each in (case.true, robot))
+    return rms(there[:, :3] - meant[:, :3])
 
 
 def rms(off: Any) -> float:

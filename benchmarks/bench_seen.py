@@ -19,7 +19,7 @@ import numpy as np
 from scipy.stats import norm
 
 import pkmcal as pk
-from benchmarks.imperfect import models, outsider  # noqa: F401  # they add scenarios
+from benchmarks.imperfect import models, outsider, silent, statements  # noqa: F401  # they add scenarios
 from benchmarks.imperfect.cases import SCENARIOS, Case
 from benchmarks.timing import Report
 from pkmcal.arrays import FloatArray

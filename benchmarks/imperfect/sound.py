@@ -49,11 +49,29 @@ def sound_printer(rng: np.random.Generator) -> Case:
 @scenario("sound")
 def sound_cables(rng: np.random.Generator) -> Case:
     """Eight cables, which are more than the six ways to move."""
+    return cables(rng, 0.3)
+
+
+@scenario("sound")
+def sound_cables_exact(rng: np.random.Generator) -> Case:
+    """The same, lengths without any noise."""
+    return cables(rng, 0.0)
+
+
+@scenario("sound")
+def sound_hexapod_noisy_actuators(rng: np.random.Generator) -> Case:
+    """Actuators have a stated deviation, poses none."""
+    robot, true, q, read = hexapod(rng)
+    log = q + rng.normal(0.0, 0.03, q.shape)
+    return poses_of(robot, true, log, read, actuator_sigma=0.03)
+
+
+def cables(rng: np.random.Generator, noise: float) -> Case:
     robot = machine("cables")
     names = [f"offset{i}" for i in range(1, 9)]
     true = off(robot, rng, 2.0, names)
     poses = robot.home + rng.uniform(-1, 1, (40, 6)) * [900, 600, 500, 0.1, 0.1, 0.1]
-    q = true.inverse(poses) + rng.normal(0.0, 0.3, (40, 8))
+    q = true.inverse(poses) + rng.normal(0.0, noise, (40, 8))
     data = pk.Measurements(q, noisy(rng, poses, 0.1, 1e-4), "pose")
     return Case(robot, true, data, names)
 

@@ -27,9 +27,7 @@ from pkmcal.estimation.loss import LossName
 from pkmcal.estimation.parameters import Asked, Parameters
 from pkmcal.estimation.pose_minima import solved_in_least_minima
 from pkmcal.estimation.starts import known_distances
-from pkmcal.estimation.uncertainty import (
-    unlike_components,
-)
+from pkmcal.estimation.unlike_components import unlike_components
 from pkmcal.exceptions import ArgumentError
 from pkmcal.fitted.datum import datum as choose_datum
 from pkmcal.fitted.dropped import held_without, robust_outliers, without

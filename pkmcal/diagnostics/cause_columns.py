@@ -10,7 +10,7 @@ import numpy as np
 
 from pkmcal import screw
 from pkmcal.arrays import BoolArray, FloatArray, IntArray, lots
-from pkmcal.diagnostics.columns import of_poses, of_rows
+from pkmcal.diagnostics.columns import of_actuators, of_poses, of_rows
 from pkmcal.effects.gears import Coupling, Harmonics
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.exceptions import ArgumentError
@@ -45,24 +45,21 @@ class Cause(NamedTuple):
     columns: Callable[[Fit], Columns | None]
 
 
-def _by_actuators(fit: Fit, poses: IntArray) -> FloatArray:
-    """Twists (b, 6, n) of the platform by its actuators."""
-    return fit.end.machines.actuator_twists(fit.end.states, poses)
-
-
-def _by_all_actuators(fit: Fit, factors: FloatArray) -> Columns:
+def _by_all_actuators(fit: Fit, factors: FloatArray) -> Columns | None:
     """Columns of actuators that all become longer, by factors (K, d) of each pose."""
-    return of_poses(
-        fit,
-        lambda poses: (
-            _by_actuators(fit, poses).sum(axis=2, keepdims=True) * factors[poses][:, None, :]
-        ),
-    )
+    count = _at(fit).actuators.shape[1]
+    return of_actuators(fit, lambda poses: np.repeat(factors[poses][:, None, :], count, axis=1))
 
 
-def _by_each_actuator(fit: Fit, factors: FloatArray) -> Columns:
+def _by_each_actuator(fit: Fit, factors: FloatArray) -> Columns | None:
     """Columns of each actuator that becomes longer, by factors (K, n) of each pose."""
-    return of_poses(fit, lambda poses: _by_actuators(fit, poses) * factors[poses][:, None, :])
+    unit = np.eye(factors.shape[1])
+    return of_actuators(fit, lambda poses: factors[poses][:, :, None] * unit)
+
+
+def _at(fit: Fit) -> Evaluation:
+    """The solution that the design is of: poses with unknowns where they fit best."""
+    return fit.estimate.evaluation
 
 
 def _before(fit: Fit) -> IntArray:
@@ -70,8 +67,8 @@ def _before(fit: Fit) -> IntArray:
 
     Of a pose where it was several times, at the last of them.
     """
-    equations = fit.equations
-    before = np.arange(len(fit.end.pose))
+    equations = fit.uncertainty.equations
+    before = np.arange(len(_at(fit).pose))
     for i, data in enumerate(equations.prediction.datasets):
         m = data.measured
         time = np.arange(len(m)) if m.time is None else m.time
@@ -92,34 +89,34 @@ def _travelled(fit: Fit, ways: FloatArray) -> BoolArray:
 
     Where it was to stay, as at the height at which a probe touches, its place is the error itself.
     """
-    travelled: BoolArray = np.ptp(ways, axis=0) > _LEAST_TRAVEL * fit.end.robot.length
+    travelled: BoolArray = np.ptp(ways, axis=0) > _LEAST_TRAVEL * _at(fit).robot.length
     return travelled
 
 
 def _lag(fit: Fit) -> Columns:
     """The platform was still on its way: a part of the way back to the pose before."""
-    before, pose = _before(fit), fit.end.pose
+    before, pose = _before(fit), _at(fit).pose
     twist = np.empty((len(pose), 6))
     for own in lots(len(pose)):
         back = screw.from_pose(pose[before[own]]) @ np.linalg.inv(screw.from_pose(pose[own]))
         twist[own, :3] = screw.log(back)[:, :3]
         twist[own, 3:] = pose[before[own], :3] - pose[own, :3]
-    arcs = twist * np.repeat([fit.end.robot.length, 1.0], 3)
+    arcs = twist * np.repeat([_at(fit).robot.length, 1.0], 3)
     twist = np.where(_travelled(fit, arcs), twist, 0.0)
     return of_poses(fit, lambda poses: twist[poses][:, :, None])
 
 
-def _play(fit: Fit) -> Columns:
+def _play(fit: Fit) -> Columns | None:
     """Each actuator stops short of where it was to go, by the direction it came from."""
-    q = fit.end.actuators
+    q = fit.uncertainty.equations.table.actuators
     way = q - q[_before(fit)]
-    least = _LEAST_WAY * fit.end.robot.length
+    least = _LEAST_WAY * _at(fit).robot.length
     return _by_each_actuator(fit, np.sign(np.where(np.abs(way) > least, way, 0.0)))
 
 
-def _warming(fit: Fit) -> Columns:
+def _warming(fit: Fit) -> Columns | None:
     """All actuators become longer alike while it is measured."""
-    equations, count = fit.equations, len(fit.end.pose)
+    equations, count = fit.uncertainty.equations, len(_at(fit).pose)
     when = np.zeros(count)
     for i, data in enumerate(equations.prediction.datasets):
         m = data.measured
@@ -128,37 +125,42 @@ def _warming(fit: Fit) -> Columns:
     return _by_all_actuators(fit, when[:, None])
 
 
-def _by_place(fit: Fit) -> Columns:
+def _by_place(fit: Fit) -> Columns | None:
     """All actuators are longer by where the machine is: along x, y and z."""
-    place = fit.end.pose[:, :3] - fit.end.pose[:, :3].mean(axis=0)
+    place = _at(fit).pose[:, :3] - _at(fit).pose[:, :3].mean(axis=0)
     return _by_all_actuators(fit, np.where(_travelled(fit, place), place, 0.0))
 
 
-def _curved(fit: Fit) -> Columns:
+def _curved(fit: Fit) -> Columns | None:
     """Each actuator has an error that is quadratic in its reading."""
-    return _by_each_actuator(fit, (fit.end.actuators - fit.end.actuators.mean(axis=0)) ** 2)
+    q = fit.uncertainty.equations.table.actuators
+    return _by_each_actuator(fit, (q - q.mean(axis=0)) ** 2)
 
 
 def _sag(fit: Fit) -> Columns | None:
     """Each actuator yields to the weight of the platform, a force along -z at its origin.
 
-    Arms yield to the weight of their links: a check of its own tests that at poses left out.
+    Arms yield to the weight of their links: a check of its own tests that at poses left out. Of
+    surplus actuators forces do not follow from the weight alone.
     """
-    if isinstance(fit.parameters.robot, ArmMachine):
+    if isinstance(fit.parameters.robot, ArmMachine) or fit.uncertainty.mixed:
         return None
+    end = _at(fit)
 
-    def twists(poses: IntArray) -> FloatArray:
-        found = _by_actuators(fit, poses)
-        return found * -found[:, 5:6, :]
+    def yielding(poses: IntArray) -> FloatArray:
+        down = -end.machines.actuator_twists(end.states, poses)[:, 5]
+        return down[:, :, None] * np.eye(down.shape[1])
 
-    return of_poses(fit, twists)
+    return of_actuators(fit, yielding)
 
 
 def _numbers(stated: StatedUncertainty) -> Callable[[Fit], Columns | None]:
     """Columns of numbers that the fit held."""
 
     def columns(fit: Fit) -> Columns | None:
-        held = held_numbers(fit.uncertainty, fit.end, stated)
+        if SCALE in stated.own and fit.uncertainty.mixed:
+            return None  # effects need poses that follow from the actuators
+        held = held_numbers(fit.uncertainty, _at(fit), stated)
         return None if held is None else held.columns
 
     return columns

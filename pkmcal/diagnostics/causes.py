@@ -48,7 +48,7 @@ class FoundCause:
 def found_causes(found: Solution) -> tuple[FoundCause, ...]:
     """Test all causes, the one that explains most first."""
     sure = found.fit.uncertainty
-    if sure.mixed or sure.rounded or not usable(found.fit.end) or sure.fit.freedom < _FEW:
+    if sure.rounded or not usable(found.fit.estimate.evaluation) or sure.fit.freedom < _FEW:
         return ()
     pairs = list(possible(found.fit))
     every = causes(sure.fit, [columns for _, columns in pairs], CHANCE, _MOST)

@@ -21,6 +21,7 @@ from pkmcal.diagnostics import (
     rows,
     sag,
     search,
+    sides,
     units,
     waves,
 )
@@ -30,6 +31,6 @@ CHECKS = verified((
     *held_out.CHECKS, *readings.CHECKS, *units.CHECKS, *refitted_readings.CHECKS, *families.CHECKS,
     *machine.CHECKS, *loads.CHECKS, *search.CHECKS, *rows.CHECKS, *elsewhere.CHECKS,
     *near_copies.CHECKS, *rounded.CHECKS, *noise.CHECKS, *priors.CHECKS, *course.CHECKS,
-    *causes.CHECKS, *regions.CHECKS, *gain.CHECKS, *sag.CHECKS, *waves.CHECKS,
+    *causes.CHECKS, *sides.CHECKS, *regions.CHECKS, *gain.CHECKS, *sag.CHECKS, *waves.CHECKS,
 ))  # fmt: skip
 AT_ONCE = tuple(check for check in CHECKS if check.at_once)

@@ -108,10 +108,16 @@ def _unlike_sets_text(found: Solution, ratios: dict[int, float]) -> str:
 def _unestimated(found: Solution) -> tuple[tuple[str, ...], ...]:
     """Groups of equations the noise of which is neither stated nor shown."""
     sure, equations = found.fit.uncertainty, found.fit.equations
-    names = [f"of measurements {i + 1}" for i in range(len(equations.table.sets))]
-    names += ["of the load cells"] if equations.machines.cells else []
     if not (sure.mixed and sure.unknown.any()):
         return ()
+    names = []
+    for i, m in enumerate(equations.table.sets):
+        several = len(m.instrument.families) > 1
+        names += [
+            f"of {family.noun} of measurements {i + 1}" if several else f"of measurements {i + 1}"
+            for family in m.instrument.families
+        ]
+    names += ["of the load cells"] if equations.machines.cells else []
     groups = zip([*names, "of the actuators"], sure.unknown, strict=True)
     return (tuple(name for name, unknown in groups if unknown),)
 

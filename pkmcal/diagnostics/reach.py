@@ -9,10 +9,11 @@ from __future__ import annotations
 
 from pkmcal.arrays import FloatArray
 from pkmcal.estimation.uncertainty import Uncertainty
+from pkmcal.statistics.linear_fit import LinearFit
 
 _MOST = 0.5  # of the machine's size
 
 
-def reach(sure: Uncertainty) -> FloatArray:
-    """Numbers (n, p) by parameters of the linear fit, in units of how far they can be off."""
-    return sure.fit.back / (_MOST * sure.equations.parameters.robot.length)
+def reach(sure: Uncertainty, fit: LinearFit) -> FloatArray:
+    """Return numbers (n, p) by parameters of a linear fit, in units of how far they can be off."""
+    return fit.back / (_MOST * sure.equations.parameters.robot.length)

@@ -90,7 +90,7 @@ class _Compared:
     def reach(self) -> FloatArray:
         """Return the way of numbers (n, r) along the basis in units of how far they can be off."""
         sure = self.found.fit.uncertainty
-        changes: FloatArray = reach(sure) @ orthonormal(self.design)
+        changes: FloatArray = reach(sure, sure.fit) @ orthonormal(self.design)
         return changes
 
     def at_once(self, residual: FloatArray) -> float:

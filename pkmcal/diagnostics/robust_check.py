@@ -80,7 +80,9 @@ def robust_check(fit: Fit) -> RobustCheck | None:
         return None
     # both in units of the same noise
     noise = estimate.state.noise
-    of_sets = np.concatenate([noise[[i for _, i in drawn]], noise[len(equations.table.sets) :]])
+    set_of_group = equations.whitening.set_of_group
+    of_drawn = [noise[: len(set_of_group)][set_of_group == i] for _, i in drawn]
+    of_sets = np.concatenate([*of_drawn, noise[len(set_of_group) :]])
     plain = equations.residual(estimate.evaluation, noise)
     squares = few.blocks.squares(few.residual(robust.evaluation, of_sets))
     scale = median_ratio(squares, few.blocks.components) * m / (m - p)

@@ -6,7 +6,7 @@ the number of all, so that the search for it makes no false alarm where noise is
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +16,7 @@ from pkmcal.diagnostics.reach import reach
 from pkmcal.diagnostics.visits import Visits, visits_of
 from pkmcal.display import chance_text, first_rows, printable
 from pkmcal.fitted.solution import Solution
-from pkmcal.statistics.group_test import few_equations, group_test, within_reach
+from pkmcal.statistics.group_test import Groups, few_equations, group_test, within_reach
 from pkmcal.statistics.linear_fit import column_basis, numbered
 from pkmcal.statistics.two_regressions import best_division
 
@@ -84,18 +84,9 @@ def apart(found: Solution) -> Apart | None:
     if sure.mixed or sure.rounded or not sure.equations.whitening.any_read:
         return None
     visits = visits_of(found)
-    row = sure.labels.row
-    use = np.flatnonzero(~np.isin(sure.equations.table.rows, found.outliers)[row])
-    use = sure.fit.without_idle(use)
-    key = numbered(visits.series[row][use], visits.visit[row][use], sure.labels.component[use])
+    use, key = equations_of_visits(found, visits)
     groups = dict(_groups(found, visits))
-    cell = np.zeros(len(row), dtype=np.intp)
-    for mine in groups.values():
-        cell = numbered(cell, mine[row].astype(np.intp))
-    few = few_equations(sure.fit.design, sure.fit.residual, use, key, cell, reach(sure))
-    first = np.unique(cell, return_index=True)[1]  # an equation of each cell
-    tested = {name: few.tested(mine[row][first][few.cell]) for name, mine in groups.items()}
-    known = {name: each for name, each in tested.items() if each is not None}
+    known = tested(found, groups, use, key)
     seen = None
     if known:
         name = min(known, key=lambda each: known[each].chance)
@@ -108,6 +99,32 @@ def apart(found: Solution) -> Apart | None:
     return other if other is not None and other.found else seen
 
 
+def equations_of_visits(found: Solution, visits: Visits) -> tuple[IntArray, IntArray]:
+    """Equations (u,) that outliers have no part in, and of which visit and component each is."""
+    sure = found.fit.uncertainty
+    row = sure.labels.row
+    use = np.flatnonzero(~np.isin(sure.equations.table.rows, found.outliers)[row])
+    use = sure.fit.without_idle(use)
+    visit = visits.series[row][use], visits.visit[row][use]
+    return use, numbered(*visit, sure.labels.component[use])
+
+
+def tested(
+    found: Solution, groups: Mapping[str, BoolArray], use: IntArray, key: IntArray
+) -> dict[str, Groups]:
+    """Test each group of rows (N,) against the others; without those too small to be tested."""
+    sure = found.fit.uncertainty
+    row = sure.labels.row
+    cell = np.zeros(len(row), dtype=np.intp)
+    for mine in groups.values():
+        cell = numbered(cell, mine[row].astype(np.intp))
+    fit = sure.of_own_deviations
+    few = few_equations(fit.design, fit.residual, use, key, cell, reach(sure, fit))
+    first = np.unique(cell, return_index=True)[1]  # an equation of each cell
+    every = {name: few.tested(mine[row][first][few.cell]) for name, mine in groups.items()}
+    return {name: each for name, each in every.items() if each is not None}
+
+
 def _in_no_order(found: Solution, visits: Visits, use: IntArray, key: IntArray) -> Apart | None:
     """Test the division of the visits into two groups that fits best."""
     sure = found.fit.uncertainty
@@ -116,7 +133,8 @@ def _in_no_order(found: Solution, visits: Visits, use: IntArray, key: IntArray) 
     chosen = chosen[:: max(1, -(-len(chosen) // _MOST))]
     among = np.isin(visit[use], chosen)
     use, key = use[among], key[among]
-    few = few_equations(sure.fit.design, sure.fit.residual, use, key, visit, reach(sure))
+    fit = sure.of_own_deviations
+    few = few_equations(fit.design, fit.residual, use, key, visit, reach(sure, fit))
     unit = numbered(few.cell)
     mine = best_division(few.design, few.residual, unit)
     width = few.design.shape[1]

@@ -73,22 +73,19 @@ class Equations:
         table, robot = prediction.table, parameters.robot
         machines = machines_of(robot, table)
         whitening = Whitening.of(table.sets, robot.length)
-        unstated = np.array([
-            m.sigma is None and bool(read.any())
-            for m, read in zip(table.sets, whitening.read, strict=True)
-        ])  # fmt: skip
-        blocks = row_blocks(table, unstated, missing)
+        blocks = row_blocks(table, whitening.unstated(table.sets), missing)
         equations = cls(missing, prediction, whitening, machines, blocks, table.actuators)
         if not machines.unknowns:
             return equations
         prediction.refuse_free_poses()
+        whitening = whitening.by_family(table.sets)
         cells = table.cells
         of_cells = [cells is not None and cells.sigma is None] if machines.cells else []
-        groups = np.concatenate([unstated, of_cells, [table.actuator_sigma is None]]).astype(bool)
+        others = [*of_cells, table.actuator_sigma is None]
+        unstated = np.append(whitening.unstated(table.sets), others)
         slack = np.zeros((len(table.actuators), machines.equations), dtype=bool)
-        return replace(
-            equations, blocks=pose_blocks(table, machines, slack, groups, equations.size)
-        )
+        equations = replace(equations, whitening=whitening)
+        return equations._with_slack(slack, unstated)
 
     @property
     def parameters(self) -> Parameters:
@@ -142,11 +139,12 @@ class Equations:
         """The equations of poses that follow from the actuators as they read."""
         if not self.machines.unknowns:
             return self
-        unstated = self.blocks.unstated[: len(self.table.sets)]
+        whitening = self.whitening.by_set()
         return replace(
             self,
+            whitening=whitening,
             machines=self.machines.with_exact_actuators(self.without_slack),
-            blocks=row_blocks(self.table, unstated, self.missing),
+            blocks=row_blocks(self.table, whitening.unstated(self.table.sets), self.missing),
         )
 
     def with_parameters(self, parameters: Parameters) -> Equations:
@@ -176,8 +174,14 @@ class Equations:
         without_slack = self.table.actuators.copy()
         for pose, cell in zip(*np.nonzero(slack), strict=True):
             without_slack[pose, self.machines.actuators[cell]] += needed[pose, cell]
-        blocks = pose_blocks(self.table, self.machines, slack, self.blocks.unstated, self.size)
-        return replace(self, blocks=blocks, without_slack=without_slack)
+        without = replace(self, without_slack=without_slack)
+        return without._with_slack(slack, self.blocks.unstated)
+
+    def _with_slack(self, slack: BoolArray, unstated: BoolArray) -> Equations:
+        """Equations of poses with unknowns, without closures of slack cables (K, e)."""
+        of_readings = self.whitening.of_equations(self.whitening.groups)
+        blocks = pose_blocks(self.table, self.machines, slack, unstated, of_readings, self.size)
+        return replace(self, blocks=blocks)
 
     def reweighted(self, deviations: Sequence[FloatArray]) -> Equations:
         """Give the components (k,) of each set other relative deviations."""

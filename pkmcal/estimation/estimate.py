@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from pkmcal.arrays import FloatArray
 from pkmcal.estimation.elimination import Shares
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.identifiability import Decomposed, Directions
 from pkmcal.estimation.loss import Loss
+
+LEAST_NOISE = 1e-9  # mm; what is left of measurements without noise
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,8 +22,9 @@ class IterationState:
     Attributes
     ----------
     noise : ndarray (G,)
-        Factor on the stated deviations of each group of equations (the sets, then the actuators
-        where poses have unknowns); where none is stated, the deviation in mm.
+        Factor on the stated deviations of each group of equations (the sets; where poses have
+        unknowns the lengths and angles of each, then the actuators); where none is stated, the
+        deviation in mm, of angles that of their arc.
     loss : Loss
         How rows count.
     measured : Directions
@@ -122,6 +127,13 @@ class Estimate:
     def freedom(self) -> FloatArray:
         """Equations of each group less the poses and parameters they went into, (G,)."""
         return self.shares[1]
+
+    @property
+    def exact_freedom(self) -> float:
+        """Degrees of freedom of groups that are met exactly, beside others that are not."""
+        squares, freedom, _ = self.shares
+        exact = self.state.noise <= LEAST_NOISE
+        return 0.0 if exact.all() else float(np.maximum(freedom - squares, 0.0)[exact].sum())
 
     def with_noise(self, state: IterationState, factor: float) -> Estimate:
         """The estimate of a linear loss where all noise is `factor` times what it was.

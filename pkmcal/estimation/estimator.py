@@ -9,7 +9,7 @@ import numpy as np
 from pkmcal.arrays import BoolArray, FloatArray
 from pkmcal.estimation.elimination import Shares
 from pkmcal.estimation.equations import Equations
-from pkmcal.estimation.estimate import Estimate, IterationState
+from pkmcal.estimation.estimate import LEAST_NOISE, Estimate, IterationState
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.identifiability import (
     Decomposed,
@@ -32,7 +32,6 @@ _ROUNDS = 60  # of estimating noise and unidentifiable combinations again
 _LESS = 0.1  # of the deviation to which combinations are fitted, after a search without an end
 _LEAST_WORST = 5e-3  # of the machine's size: where that is not for want of measurements
 _LEAST_FALL = 0.1  # of a mean square, which a step of scoring does not go below
-_LEAST_NOISE = 1e-9  # mm; what is left of measurements without noise
 LEAST_FREEDOM = 0.5  # degrees of freedom from which the noise can be estimated
 FEW = 5.0  # below which residuals hardly show it
 LEAST_REDUNDANCY = 2.0  # the same of one group of several that share poses
@@ -184,7 +183,7 @@ class Estimator:
 
     def _kept(self, noise: FloatArray, stated: FloatArray) -> FloatArray:
         """Estimated noise of groups where none is stated, else what multiplies the stated one."""
-        return np.where(self.unstated, np.maximum(noise, _LEAST_NOISE), stated)
+        return np.where(self.unstated, np.maximum(noise, LEAST_NOISE), stated)
 
     def _first_loss(self) -> Loss:
         """Limits wide enough for the nominal machine, and no wider than gross errors allow."""
@@ -355,7 +354,7 @@ class Estimator:
             return False
         if self.loss == "linear" and not self._priors and len(self.unstated) == 1:
             return True  # the noise does not move the solution
-        if not np.allclose(old.noise, new.noise, rtol=1e-3, atol=_LEAST_NOISE):
+        if not np.allclose(old.noise, new.noise, rtol=1e-3, atol=LEAST_NOISE):
             return False
         return self.loss == "linear" or np.allclose(old.loss.width, new.loss.width, rtol=1e-3)
 

@@ -60,6 +60,16 @@ def labels(equations: Equations) -> Labels:
     return _of_mixtures(equations) if equations.machines.unknowns else _of_readings(equations)
 
 
+def component_classes(named: Labels, place: IntArray) -> list[IntArray]:
+    """Classes of equations (M,) that may have unlike variances, coarse ones first.
+
+    Sets; lengths and angles of each; x y, z and angles; each component. `place` (M,) is which
+    component each equation is.
+    """
+    schemes = (np.zeros(6), [0, 0, 0, 1, 1, 1], [0, 0, 1, 2, 2, 2], np.arange(6))
+    return [numbered(named.set_of, np.asarray(scheme, dtype=np.intp)[place]) for scheme in schemes]
+
+
 def _of_readings(equations: Equations) -> Labels:
     names: dict[str, int] = {}
     units: dict[str, int] = {}

@@ -91,6 +91,29 @@ class PoseSystem:
         evaluation.cache["following"] = self, following
         return found
 
+    def reduced(
+        self,
+        evaluation: Evaluation,
+        noise: FloatArray,
+        closures: FloatArray | None,
+        readings: FloatArray | None = None,
+    ) -> FloatArray:
+        """What is left (M, d) of changes of closures (K, e, d) and of readings (R, d), whitened.
+
+        One of them may be None: it does not change. Signs are those of `by_parameters`.
+        """
+        blocks = self.blocks
+        _, by_unknown, _ = self.at(evaluation, noise)
+        changes = readings if closures is None else closures
+        assert changes is not None
+        whole = np.zeros((len(by_unknown), changes.shape[-1]))
+        of_closures = int(blocks.counts.sum())
+        if closures is not None:
+            whole[:of_closures] = blocks.counted(closures / noise[blocks.groups][:, None])
+        if readings is not None:
+            whole[of_closures:] = readings
+        return blocks.elimination.reduced(by_unknown, whole)[0]
+
     def by_groups(
         self,
         evaluation: Evaluation,

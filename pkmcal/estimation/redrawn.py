@@ -27,7 +27,7 @@ def redrawn(
     if equations.system is not None:
         change, errors = equations.system.redrawn(at, noise, reduced)
         machines = machines.shifted(change)
-    residuals = tuple(equations.whitening.unwhiten(errors, noise[: len(equations.table.sets)]))
+    residuals = tuple(equations.whitening.unwhiten(errors, noise))
     sets = tuple(
         replace(m, values=m.instrument.corrected(values, residual).reshape(m.values.shape))
         for m, values, residual in zip(equations.table.sets, at.predicted, residuals, strict=True)

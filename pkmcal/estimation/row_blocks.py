@@ -33,7 +33,8 @@ class RowBlocks:
         The set of each block; one family for all where poses mix the noise of the groups.
     unstated : ndarray of bool (G,)
         Whether the deviation is not known, of each group of equations with a noise of its own: the
-        sets, then load cells and actuators where they have equations.
+        sets; or the lengths and angles of each, then load cells and actuators, where poses have
+        unknowns.
     uninformative : int
         How many rows or poses have no equation: nothing was read, or all that was read determines
         the pose.
@@ -117,11 +118,13 @@ def pose_blocks(
     machines: Machines,
     slack: BoolArray,
     unstated: BoolArray,
+    of_readings: IntArray,
     size: float,
 ) -> PoseBlocks:
     """Find the blocks of poses with unknowns.
 
-    `size` is the largest number that the equations are made of, mm.
+    `of_readings` are the groups of the equations of readings; `size` is the largest number that the
+    equations are made of, mm.
     """
     counts = ~slack
     if machines.missing is not None:
@@ -145,5 +148,5 @@ def pose_blocks(
         slack=slack,
         counts=counts,
         groups=groups,
-        group_of_equation=np.concatenate([groups[closure], np.repeat(table.set_of, table.count)]),
+        group_of_equation=np.concatenate([groups[closure], of_readings]),
     )

@@ -13,13 +13,18 @@ from pkmcal.estimation.cut_readings import Cut, cut_readings
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.estimate import Estimate
 from pkmcal.estimation.estimator import FEW, Estimator
-from pkmcal.estimation.labels import Labels, labels, poses_of_rows
+from pkmcal.estimation.labels import Labels, component_classes, labels, poses_of_rows
 from pkmcal.estimation.misfits import rounding
 from pkmcal.estimation.set_noise import slipped
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.statistics.clusters import shared_error_score
-from pkmcal.statistics.covariance import SHARED, Covariance, CovarianceRule, covariance
-from pkmcal.statistics.linear_fit import LinearFit, in_unit_basis, numbered, unit_basis
+from pkmcal.statistics.covariance import Covariance, CovarianceRule, covariance
+from pkmcal.statistics.linear_fit import (
+    LinearFit,
+    in_unit_basis,
+    numbered,
+    reweighted,
+    unit_basis,
+)
 from pkmcal.statistics.noise import Noise, Split, joined, noise, split
 from pkmcal.statistics.pseudo_residuals import pseudo_residuals
 from pkmcal.statistics.variance_components import told_apart, variance_components
@@ -64,6 +69,10 @@ class Uncertainty:
         Components that were read in steps which matter beside the residuals.
     cut : tuple of Cut
         Whether these were cut, as far as the fit tells.
+    prior_residual : ndarray (q,)
+        Residuals of the prior's rows.
+    information : ndarray (G, G)
+        What the residuals inform of the noise of the groups: see `elimination.Shares`.
     considered : ndarray (p, k) or None
         How the basis follows numbers that are not fitted along, in their stated deviations.
     noise_share : float
@@ -80,6 +89,8 @@ class Uncertainty:
     slips: FloatArray
     coarse: tuple[Coarse, ...]
     cut: tuple[Cut, ...]
+    prior_residual: FloatArray
+    information: FloatArray
     considered: FloatArray | None = None
     noise_share: float = 1.0
 
@@ -110,6 +121,17 @@ class Uncertainty:
     def scaled(self) -> FloatArray:
         """Covariance (n, n) of the scaled parameters."""
         return self.covariance.of(self.fit.back) + self._beside(self.fit.back)
+
+    @cached_property
+    def of_own_deviations(self) -> LinearFit:
+        """The fit with each component in units of its own deviation.
+
+        Where a stated sigma is right for some of the components and too small for others, tests of
+        the linear model take what these miss for what they look for.
+        """
+        if self.mixed or self.equations.blocks.unstated.all():
+            return self.fit  # where none is stated, they have their own already
+        return _of_own_deviations(self.fit, self.labels, self._place, self.prior_residual)
 
     def _beside(self, contrasts: FloatArray) -> FloatArray | float:
         """Return the covariance of contrasts (q, p) by offsets and numbers not fitted."""
@@ -180,6 +202,16 @@ class Uncertainty:
         """Component of its row for each equation (M,)."""
         return component_of(self.equations)
 
+    def freedom_of_noise(self, shares: FloatArray) -> float:
+        """Degrees of freedom of a variance of which groups make these shares (G,).
+
+        inf where all of them are stated.
+        """
+        mine = self.equations.blocks.unstated & (shares > 0.0)
+        known = self.information[np.ix_(mine, mine)]
+        spread = float(shares[mine] @ np.linalg.lstsq(known, shares[mine], rcond=None)[0])
+        return 1.0 / spread if spread > 0.0 else float("inf")
+
     @cached_property
     def noises(self) -> tuple[Noise, ...]:
         """Variances in mm² of a length of each set; NaN where nothing shows them."""
@@ -201,7 +233,9 @@ class Uncertainty:
         """Variances of an equation in units of what it was whitened by."""
         if self.equations.blocks.unstated.any() or self.fit.freedom >= FEW:
             sandwich = self.covariance.sandwich
-            return noise(sandwich.residual, sandwich.retained, self.fit.key)
+            total, shared = noise(sandwich.residual, sandwich.retained, self.fit.key)
+            shown = 1.0 - self.fit.exact / float(sandwich.retained.sum())
+            return total / shown, shared / shown
         return 1.0, 0.0
 
     def noise_of(self, i: int, family: int = 0) -> Noise:
@@ -212,9 +246,12 @@ class Uncertainty:
     def _noise(self, i: int, family: int) -> Noise:
         stated = self.stated_variances(i, family)
         if self.mixed:
-            own = float(self.factors[i] ** 2 if stated is None else stated.mean())
-            shown = self.equations.table.sets[i].components and not self.unknown[i]
-            return own * self.excess[0] if shown else float("nan"), 0.0
+            families = self.equations.table.sets[i].instrument.families
+            if not families:
+                return float("nan"), 0.0
+            group = self.equations.whitening.groups[i][families[family].columns[0]]
+            own = float(self.factors[group] ** 2 if stated is None else stated.mean())
+            return float("nan") if self.unknown[group] else own * self.excess[0], 0.0
         if stated is not None and self.fit.freedom < FEW:
             return float(stated.mean()), 0.0
         mine = self.family_of(i, family) if family else self.lengths_of(i)
@@ -289,7 +326,7 @@ def uncertainty(
         rule = "cluster"  # which holds whatever the weights
     apart = None
     if classes is not None:
-        apart = variance_components(fit, classes, _prior_residual(estimator, estimate))
+        apart = variance_components(fit, classes, prior_residual(estimator, estimate))
     found = covariance(
         fit,
         rule,
@@ -297,6 +334,11 @@ def uncertainty(
         robust=estimator.loss != "linear",
         components=apart,
     )
+    beyond = prior_residual(estimator, estimate)
+    refuted = not estimator.unstated.any() and np.isfinite(found.scale_freedom)
+    refuted = refuted and rule == "auto" and not equations.machines.unknowns
+    if refuted and _of_own_deviations(fit, named, component_of(equations), beyond) is not fit:
+        found = replace(found, rule="cluster")  # sigma is wrong of some components alone
     coarse = coarse_readings(equations, named, fit, state.noise, found)
     widening = max((each.widening for each in coarse), default=1.0)
     return Uncertainty(
@@ -310,7 +352,24 @@ def uncertainty(
         slips=slips,
         coarse=coarse,
         cut=tuple(cut_readings(equations, named, fit, state.noise, coarse)),
+        prior_residual=beyond,
+        information=estimate.shares[2],
     )
+
+
+def _of_own_deviations(
+    fit: LinearFit, named: Labels, place: IntArray, beyond: FloatArray
+) -> LinearFit:
+    """Return the fit with other weights of components, or itself if those that it has will do.
+
+    `beyond` are the residuals of the prior's rows.
+    """
+    if not named.component.any():
+        return fit  # a single component
+    found = told_apart(fit, component_classes(named, place), beyond)
+    if found is None:
+        return fit
+    return reweighted(fit, np.sqrt(found.variances)[found.classes], beyond)
 
 
 def solved(estimator: Estimator, estimate: Estimate) -> LinearModel:
@@ -330,51 +389,9 @@ def solved(estimator: Estimator, estimate: Estimate) -> LinearModel:
         back = unit_basis(estimate.triangle, estimate.prior, state.determined.identifiable)
         design = estimate.change(back)
     fit = in_unit_basis(design, residual, estimate.prior, back, named.pose, named.component)
-    return named, fit
+    return named, replace(fit, exact=estimate.exact_freedom)
 
 
-def _prior_residual(estimator: Estimator, estimate: Estimate) -> FloatArray:
+def prior_residual(estimator: Estimator, estimate: Estimate) -> FloatArray:
+    """Residuals (q,) of the prior's rows."""
     return estimator.equations.parameters.prior_left(estimate.evaluation.theta)
-
-
-def unlike_components(
-    estimator: Estimator, estimate: Estimate, solution: LinearModel
-) -> tuple[IntArray, list[FloatArray]] | None:
-    """Test sets without sigma for components of unlike variance.
-
-    Tried in turn: lengths and angles, x y and z and angles, each component.
-
-    Returns
-    -------
-    classes : ndarray of int (M,)
-        Of the equations.
-    deviations : list of ndarray (k,)
-        Relative deviation of each component of each set.
-
-    None where nothing speaks for it; where sigma is stated; for robust losses; where rows of a pose
-    share errors, which are the model's more than the instrument's and no ground for weights; and
-    where equations are mixtures.
-    """
-    equations = estimator.equations
-    several = any(len(m.components) > 1 for m in equations.table.sets)
-    if equations.machines.unknowns:
-        return None
-    if estimator.loss != "linear" or not estimator.unstated.all() or not several:
-        return None
-    named, fit = solution
-    if shared_error_score(fit) > SHARED:
-        return None
-    every = [np.tile(np.arange(len(m.components)), len(m)) for m in equations.table.sets]
-    place = np.concatenate(every)[equations.whitening.present]
-    schemes = (np.zeros(6), [0, 0, 0, 1, 1, 1], [0, 0, 1, 2, 2, 2], np.arange(6))
-    candidates = [
-        numbered(named.set_of, np.asarray(scheme, dtype=np.intp)[place]) for scheme in schemes
-    ]
-    found = told_apart(fit, candidates, _prior_residual(estimator, estimate))
-    if found is None:
-        return None
-    deviations = [np.ones(len(m.components)) for m in equations.table.sets]
-    of_equation = np.sqrt(found.variances)[found.classes]
-    for i, k, deviation in zip(named.set_of, place, of_equation, strict=True):
-        deviations[i][k] = deviation
-    return found.classes, deviations

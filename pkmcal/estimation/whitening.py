@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray, lots
+from pkmcal.arrays import BoolArray, FloatArray, IntArray, lots
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.readings import orientation
 
@@ -19,8 +19,8 @@ _TOGETHER = 16384  # rows that are whitened at once by matrices
 class Whitening:
     """Whitening: it takes the readings of each set to units of their standard deviation.
 
-    The `noise` (G,) of its methods multiplies the stated deviations of each set; groups beyond the
-    sets have none here.
+    The `noise` (G,) of its methods multiplies the stated deviations of each group of components;
+    groups beyond those of the sets have none here.
 
     Attributes
     ----------
@@ -31,20 +31,58 @@ class Whitening:
         Which numbers of each set were read.
     deviations : tuple of ndarray (k,)
         Relative deviations of the components of each set; 1 unless they were told apart.
+    groups : tuple of ndarray of int (k,)
+        The group of each component of each set: the set, or its lengths and angles by themselves.
+    set_of_group : ndarray of int
+        The set of each group.
     """
 
     white: tuple[FloatArray, ...]
     read: tuple[BoolArray, ...]
     deviations: tuple[FloatArray, ...]
+    groups: tuple[IntArray, ...]
+    set_of_group: IntArray
 
     @classmethod
     def of(cls, sets: Sequence[Measurements], length: float) -> Whitening:
         """As the sets state their sigma, on a machine of this length in mm."""
+        every = np.arange(len(sets))
         return cls(
             tuple(_whitening(m, length) for m in sets),
             tuple(np.isfinite(m.values).reshape(len(m), -1) for m in sets),
             tuple(np.ones(len(m.components)) for m in sets),
+            tuple(np.full(len(m.components), i) for i, m in enumerate(sets)),
+            every,
         )
+
+    def by_set(self) -> Whitening:
+        """Put all components of a set into one group."""
+        groups = tuple(np.full(len(each), i) for i, each in enumerate(self.groups))
+        return replace(self, groups=groups, set_of_group=np.arange(len(groups)))
+
+    def by_family(self, sets: Sequence[Measurements]) -> Whitening:
+        """Put lengths and angles of each set into groups of their own."""
+        groups, of_set = list[IntArray](), list[int]()
+        for i, m in enumerate(sets):
+            groups.append(np.empty(len(m.components), dtype=np.intp))
+            for family in m.instrument.families:
+                groups[-1][list(family.columns)] = len(of_set)
+                of_set.append(i)
+        return replace(self, groups=tuple(groups), set_of_group=np.array(of_set, dtype=np.intp))
+
+    def unstated(self, sets: Sequence[Measurements]) -> BoolArray:
+        """Return whether readings of each group have no stated deviation."""
+        found = np.zeros(len(self.set_of_group), dtype=bool)
+        for m, read, groups in zip(sets, self.read, self.groups, strict=True):
+            if m.sigma is None:
+                found[groups[read.any(axis=0)]] = True
+        return found
+
+    def of_equations(self, groups: Sequence[IntArray]) -> IntArray:
+        """Return numbers of the components (k,) of each set for each reading (M,)."""
+        whole = [np.tile(own, len(read)) for own, read in zip(groups, self.read, strict=True)]
+        found: IntArray = np.concatenate(whole)[self.present]
+        return found
 
     @cached_property
     def present(self) -> BoolArray:
@@ -103,7 +141,8 @@ class Whitening:
             part[:] = np.einsum("nij,nj...->ni...", white, part)
         else:
             part *= white.reshape(*white.shape, *(1,) * (part.ndim - 2))
-        part /= noise[i]
+        of_components = noise[self.groups[i]]
+        part /= of_components.reshape(-1, *(1,) * (part.ndim - 2))
 
     def unwhiten(self, whitened: FloatArray, noise: FloatArray) -> list[FloatArray]:
         """Invert `whitened` for vectors (M,): parts (N, k) of all sets, mm and rad.
@@ -112,13 +151,14 @@ class Whitening:
         """
         rest = np.zeros(len(self.present))
         rest[self.present] = whitened
-        parts = []
-        for white, factor in zip(self.white, noise, strict=True):
+        parts: list[FloatArray] = []
+        for white, groups in zip(self.white, self.groups, strict=True):
             rows, k = white.shape[:2]
             own, rest = np.split(rest, [rows * k])
-            part = factor * own.reshape(rows, -1)
+            part = noise[groups] * own.reshape(rows, -1)
             if white.ndim == 3:
-                parts.append(np.linalg.solve(white, part[:, :, None])[:, :, 0])
+                solved = np.linalg.solve(white, part[:, :, None])[:, :, 0]
+                parts.append(np.asarray(solved, dtype=np.float64))
             else:
                 parts.append(part / white)
         return parts
@@ -126,9 +166,10 @@ class Whitening:
     def variances(self, noise: FloatArray) -> FloatArray:
         """Variances (M,) of the readings as they are weighted, mm² and rad²."""
         parts = []
-        for white, factor in zip(self.white, noise, strict=False):
+        for white, groups in zip(self.white, self.groups, strict=True):
             each = np.linalg.inv(white) ** 2 if white.ndim == 3 else white**-2.0
-            parts.append(factor**2 * (each.sum(axis=2) if each.ndim == 3 else each).ravel())
+            each = each.sum(axis=2) if each.ndim == 3 else each
+            parts.append((noise[groups] ** 2 * each).ravel())
         variances: FloatArray = np.concatenate(parts)[self.present]
         return variances
 

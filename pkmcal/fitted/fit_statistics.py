@@ -132,10 +132,10 @@ def misfit(
     shown = np.where(estimator.unstated & ~uncertainty.unknown, state.noise, np.nan)
     deviations = equations.whitening.deviations
     sets = equations.table.sets
-    arcs = [
-        np.asarray(sigma * relative)
-        for relative, sigma, _ in zip(deviations, shown, sets, strict=False)
-    ]
+    groups, set_of_group = equations.whitening.groups, equations.whitening.set_of_group
+    arcs = [relative * shown[group] for relative, group in zip(deviations, groups, strict=True)]
+    left = np.bincount(set_of_group, estimate.freedom[: len(set_of_group)], len(sets))
+    beside = estimate.freedom[len(set_of_group) :]
     by_component = tuple(
         tuple((arc / m.instrument.mm(m, estimator.start.robot.length)).tolist())
         for m, arc in zip(sets, arcs, strict=True)
@@ -151,7 +151,7 @@ def misfit(
         "actuator_noise": float(shown[-1]) if equations.machines.unknowns else float("nan"),
         "tension_noise": float(shown[-2]) if equations.machines.cells else float("nan"),
         "tension_rms": misfits.cell_rms(equations, estimate.evaluation),
-        "redundancy": tuple(estimate.freedom.tolist()),
+        "redundancy": (*left.tolist(), *beside.tolist()),
         "idle": equations.blocks.uninformative,
         "chi2_per_dof": float((squares + prior @ prior) / dof) if stated else float("nan"),
         "dof": dof,

@@ -52,19 +52,17 @@ def held_numbers(
 ) -> HeldNumbers | None:
     """The numbers that a statement names and the fit has not.
 
-    None where equations are mixtures, or there are no such numbers.
+    None where there are no such numbers.
 
     Parameters
     ----------
     sure : Uncertainty
         Of the fit.
     end : Evaluation
-        Its solution, poses following from the actuators.
+        Its solution.
     stated : StatedUncertainty
         Which numbers, and their deviations.
     """
-    if sure.mixed:
-        return None
     fitted, chosen = sure.equations, sure.equations.parameters
     wide = beside(chosen, fitted.prediction.datasets, stated)
     if wide is None:
@@ -74,7 +72,8 @@ def held_numbers(
 
     def columns() -> Iterator[tuple[slice, FloatArray]]:
         equations = Equations.of(sets, more).reweighted(fitted.whitening.deviations)
-        evaluation = equations.at(theta_of(more, chosen, end.theta), near=end.states)
+        equations = replace(equations, blocks=fitted.blocks)  # slack cables count in neither
+        evaluation = equations.at(theta_of(more, chosen, end.theta), sure.factors, end.states)
         for _, rows, some in equations.batches(evaluation, sure.factors):
             yield rows, some[:, new]
 

@@ -45,9 +45,6 @@ class HeldFamily:
         without the points that are off.
     test : HoldoutTest or None
         Whether they contradict the fit; None where their noise is not known.
-    together : HoldoutTest or None
-        That of all families at once, where only their common noise is known: the readings have no
-        sigma, and residuals of mixtures do not show how it divides among the families.
     """
 
     family: Family
@@ -55,13 +52,11 @@ class HeldFamily:
     expected: float
     rms_without_outliers: float
     test: HoldoutTest | None
-    together: HoldoutTest | None = None
 
     @property
     def contradicts(self) -> bool:
         """True if held-out points contradict the fit, the few that are far off included."""
-        tests = (self.test, self.together) if self.together is not None else (self.test,)
-        return all(each is not None and each.contradicts for each in tests)
+        return self.test is not None and self.test.contradicts
 
     @property
     def agrees_otherwise(self) -> bool:
@@ -284,27 +279,16 @@ def families(
             return float("nan")
         return float(np.sqrt((squares / points.arc**2)[of].sum() / count))
 
-    several = [mine for _, whole in _each_unit(points) if (mine := whole & good).any()]
-    together = None
-    if len(several) > 1 and uncertainty.mixed and _without_sigma(points, uncertainty):
-        together = _test(points, named, np.logical_or.reduce(several), uncertainty)
-    for unit, whole in _each_unit(points):
-        if not (mine := whole & good).any():
-            continue
+    several = [(unit, mine) for unit, whole in _each_unit(points) if (mine := whole & good).any()]
+    for unit, mine in several:
+        test = _test(points, named, mine, uncertainty)
         yield HeldFamily(
             family=Family(unit),
             rms=rms(points.residual**2, mine),
             expected=rms(points.own + by_fit, mine),
             rms_without_outliers=rms(points.residual**2, mine & ~odd),
-            test=_test(points, named, mine, uncertainty),
-            together=together,
+            test=None if test is None else replace(test, of=len(several)),
         )
-
-
-def _without_sigma(points: Points, uncertainty: Uncertainty) -> bool:
-    """Return whether some of the fitted sets that these are like state no sigma."""
-    sets = uncertainty.equations.table.sets
-    return any(stated_variances(sets[i]) is None for i in set(points.like[points.known].tolist()))
 
 
 def _test(
@@ -331,7 +315,26 @@ def _test(
     common = shared + float(np.mean(points.by_actuators[good] / own)) * total
     of_held = total, min(common, total)
     taken = float(points.taken[good].mean())
-    return holdout_test(fitted, held, split, covariance, of_held, taken)
+    most = _freedom_of_noise(points, good, uncertainty)
+    return holdout_test(fitted, held, split, covariance, of_held, taken, most)
+
+
+def _freedom_of_noise(points: Points, good: BoolArray, uncertainty: Uncertainty) -> float:
+    """Degrees of freedom of the noise of some equations (M,), of mixtures; else inf.
+
+    Residuals of mixtures are of all groups in part: what they say of one of these is less than
+    their number.
+    """
+    if not uncertainty.mixed:
+        return float("inf")
+    whitening = uncertainty.equations.whitening
+    shares = np.zeros(len(uncertainty.factors))
+    for like, family in set(zip(points.like[good], points.family[good], strict=True)):
+        mine = good & (points.like == like) & (points.family == family)
+        columns = uncertainty.equations.table.sets[like].instrument.families[family].columns
+        shares[whitening.groups[like][columns[0]]] += points.reading[mine].sum()
+    shares[-1] += points.by_actuators[good].sum()
+    return uncertainty.freedom_of_noise(shares / shares.sum())
 
 
 def _fitted(uncertainty: Uncertainty, sets: IntArray, family: IntArray) -> tuple[Lengths, Noise]:
@@ -343,7 +346,7 @@ def _fitted(uncertainty: Uncertainty, sets: IntArray, family: IntArray) -> tuple
     unit = np.zeros(len(uncertainty.fit.residual))
     if uncertainty.mixed:
         values = sandwich.residual
-        unit[:] = np.sqrt(uncertainty.excess[0])
+        unit[:] = np.sqrt((values**2).sum() / sandwich.retained.sum())
     else:
         values = uncertainty.adjusted
         for i, there in sorted(set(zip(sets.tolist(), family.tolist(), strict=True))):

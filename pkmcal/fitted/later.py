@@ -95,15 +95,16 @@ def differs(fitted: Equations, data: FitData, like: int) -> bool:
 
 def noise_factors(rows: Later, equations: Equations, sure: Uncertainty) -> FloatArray:
     """Return factors of the deviations of each group of these equations."""
-    factors = []
-    for data, i in zip(rows.data, rows.like, strict=True):
+    mine, theirs = equations.whitening, sure.equations.whitening
+    factors = np.ones(len(mine.set_of_group))
+    for data, i, groups in zip(rows.data, rows.like, mine.groups, strict=True):
         if not differs(sure.equations, data, i):
-            factors.append(float(sure.factors[i]))
-        else:
-            stated = data.measured.sigma is not None
-            factors.append(1.0 if stated else float(np.sqrt(sure.noises[i][0])))
-    unstated = equations.blocks.unstated[len(rows.data) :]  # load cells and actuators
-    of_fit = sure.factors[len(sure.equations.table.sets) :]
+            first = np.unique(groups, return_index=True)
+            factors[first[0]] = sure.factors[theirs.groups[i][first[1]]]
+        elif data.measured.sigma is None:
+            factors[groups] = float(np.sqrt(sure.noises[i][0]))
+    unstated = equations.blocks.unstated[len(factors) :]  # load cells and actuators
+    of_fit = sure.factors[len(theirs.set_of_group) :]
     alike = len(of_fit) == len(unstated)
     return np.concatenate([factors, np.where(unstated, of_fit if alike else 1.0, 1.0)])
 

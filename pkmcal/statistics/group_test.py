@@ -34,10 +34,13 @@ class Groups:
     apart : float
         Standard deviation of the residuals if each group has its own parameters, over that with
         common ones.
+    ratio : float
+        Squares of what the parameters of the groups differ by, over what noise lets expect.
     """
 
     chance: float
     apart: float
+    ratio: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +111,8 @@ def _by_own_noise(
     for other, freedom in zip((1.0 - share, share), freedoms, strict=True):
         spread += float((other**2).sum() + other.sum() ** 2) / (2.0 * freedom)
     ratio = float(along @ along) / (k + 2.0 * spread - 6.0 * spread / (k + 2.0))
-    return replace(plain, chance=f_tail(min(ratio, 1e300), k, k * (k + 2.0) / (3.0 * spread)))
+    chance = f_tail(min(ratio, 1e300), k, k * (k + 2.0) / (3.0 * spread))
+    return replace(plain, chance=chance, ratio=ratio)
 
 
 def few_equations(
@@ -221,7 +225,8 @@ def group_test(
     if not rest > 0.0:
         return None
     ratio = min(explained / k / rest, 1e300)
-    return Groups(f_tail(ratio, k, freedom), float(np.sqrt(rest / (whole / (freedom + k)))))
+    apart = float(np.sqrt(rest / (whole / (freedom + k))))
+    return Groups(f_tail(ratio, k, freedom), apart, ratio)
 
 
 def _own(common: FloatArray, residual: FloatArray, mine: BoolArray) -> tuple[FloatArray, ...]:

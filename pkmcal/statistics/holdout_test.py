@@ -36,12 +36,15 @@ class HoldoutTest:
         How likely a ratio as large would be if fit, noise and covariance were right.
     freedom : (float, float)
         Degrees of freedom of the F test.
+    of : int
+        How many such tests are made of the points.
     """
 
     ratio: float
     median_ratio: float
     chance: float
     freedom: tuple[float, float]
+    of: int = 1
 
     @property
     def contradicts(self) -> bool:
@@ -51,7 +54,7 @@ class HoldoutTest:
     @property
     def least_ratio(self) -> float:
         """Ratio of rms to what is expected from which the points can contradict the fit."""
-        return max(RATIO, float(np.sqrt(f_limit(CHANCE, *self.freedom))))
+        return max(RATIO, float(np.sqrt(f_limit(CHANCE / self.of, *self.freedom))))
 
     @property
     def chance_nearer(self) -> float:
@@ -62,12 +65,12 @@ class HoldoutTest:
     @property
     def nearer(self) -> bool:
         """True if the points are nearer than noise and covariance let expect."""
-        return self.ratio < 1.0 / RATIO and self.chance_nearer < NEARER
+        return self.ratio < 1.0 / RATIO and self.chance_nearer < NEARER / self.of
 
     @property
     def few_off(self) -> bool:
         """True if the rms alone contradicts the fit, which a few points can cause."""
-        return self.chance < CHANCE and self.ratio > RATIO
+        return self.chance < CHANCE / self.of and self.ratio > RATIO
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,6 +107,7 @@ def holdout_test(
     covariance: FloatArray,
     of_held: Noise | None = None,
     taken: float = 0.0,
+    most: float = np.inf,
 ) -> HoldoutTest:
     """Compare.
 
@@ -119,13 +123,15 @@ def holdout_test(
         That of `held`, where its errors share another part of the same variance.
     taken : float
         Share of the equations of `held` that numbers found from these took.
+    most : float
+        Degrees of freedom of the variance of the errors, where these are fewer than the residuals'.
     """
     expected = split[0] + float(
         np.einsum("ij,jk,ik->", held.design, covariance, held.design)
     ) / len(held.residual)
     ratio = float(np.sqrt(np.mean(held.residual**2) / expected))
     first = _of_sum(held, of_held or split, covariance) * (1.0 - taken)
-    second = _of_residuals(fitted, split)
+    second = min(_of_residuals(fitted, split), most)
     poses = np.bincount(fitted.pose)
     squares = np.bincount(fitted.pose, fitted.residual**2)[poses > 0] / poses[poses > 0]
     if len(squares) > 2 and (spread := float(squares.var(ddof=1))) > 0:

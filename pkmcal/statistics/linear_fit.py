@@ -8,7 +8,7 @@ spoil the others.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 
 import numpy as np
@@ -42,6 +42,8 @@ class LinearFit:
         Which equations may share an error: those of one pose have one number, from 0.
     component : ndarray of int (M,)
         Which may share the same: x, y, z, …, by number.
+    exact : float
+        Degrees of freedom of equations that are met exactly: these show no noise of the others.
     """
 
     design: FloatArray
@@ -50,6 +52,7 @@ class LinearFit:
     back: FloatArray
     cluster: IntArray
     component: IntArray
+    exact: float = 0.0
 
     @cached_property
     def leverage(self) -> FloatArray:
@@ -59,8 +62,8 @@ class LinearFit:
 
     @property
     def freedom(self) -> float:
-        """Equations less the parameters that went into them."""
-        return round(float(len(self.residual) - self.leverage.sum()), _WHOLE)
+        """Equations less the parameters that went into them, and less those met exactly."""
+        return round(float(len(self.residual) - self.leverage.sum()) - self.exact, _WHOLE)
 
     @property
     def squares(self) -> float:
@@ -86,6 +89,18 @@ class LinearFit:
         idle = exact[~(self.design[use[exact]] != 0.0).any(axis=1)]
         kept: IntArray = np.delete(use, idle)
         return kept
+
+
+def reweighted(fit: LinearFit, deviations: FloatArray, prior_residual: FloatArray) -> LinearFit:
+    """Solve a fit again with other deviations (M,) of its equations, in units of the present ones.
+
+    `prior_residual` (q,) are the residuals of the prior's rows.
+    """
+    design, residual = fit.design / deviations[:, None], fit.residual / deviations
+    back = unit_basis(design, fit.prior, np.eye(design.shape[1]))
+    design, prior = design @ back, fit.prior @ back
+    residual = residual - design @ (design.T @ residual + prior.T @ prior_residual)
+    return replace(fit, design=design, residual=residual, prior=prior, back=fit.back @ back)
 
 
 def linear_fit(

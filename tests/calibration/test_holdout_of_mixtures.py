@@ -33,10 +33,30 @@ def held_out(seed: int, noise: list[float], winches: float, off: float = 0.0) ->
 def test_held_out_rows_agree_whatever_is_the_ratio_of_lengths_and_angles(
     length: float, angle: float
 ) -> None:
-    """Without sigma one noise of both is found: the cables' own errors hide how it divides."""
+    """Each has a noise of its own, which residuals show though the cables' errors are in them."""
     noise = [length] * 3 + [angle] * 3
     found = [held_out(seed, noise, 0.1).holdout_contradicts for seed in range(DRAWS)]
     assert sum(found) <= 1
+
+
+@pytest.mark.parametrize("winches, length, angle", [(0.3, 0.1, 1e-4), (0.1, 0.3, 1e-3)])
+def test_lengths_angles_and_cables_each_have_the_noise_that_was_drawn(
+    winches: float, length: float, angle: float
+) -> None:
+    found = [held_out(seed, [length] * 3 + [angle] * 3, winches) for seed in range(20, 28)]
+    noise = [[*np.array(each.component_noise[0])[[0, 5]], each.actuator_noise] for each in found]
+    assert np.median(noise, axis=0) == pytest.approx([length, angle, winches], rel=0.25)
+
+
+def test_cables_without_noise_leave_lengths_and_angles_their_own() -> None:
+    """Lengths that are met exactly show nothing of the noise of the readings beside them."""
+    found = [held_out(seed, [0.1] * 3 + [1e-4] * 3, 0.0) for seed in range(40, 48)]
+    noise = [np.array(each.component_noise[0])[[0, 5]] for each in found]
+    ratio = [each.holdout_rms / each.holdout_expected for each in found]
+    assert np.median(noise, axis=0) == pytest.approx([0.1, 1e-4], rel=0.15)
+    assert np.mean(ratio) == pytest.approx(1.0, abs=0.12)
+    assert all(each.verdict.state == "calibrated" for each in found)
+    assert not any(said.check == "holdout-nearer" for each in found for said in each.verdict.said)
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])

@@ -2,6 +2,7 @@
 
 import warnings
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,9 +10,11 @@ import pytest
 import pkmcal as pk
 from pkmcal.diagnostics.cause_columns import CAUSES, possible
 from pkmcal.diagnostics.causes import found_causes
+from pkmcal.diagnostics.columns import of_actuators
 from pkmcal.diagnostics.regions import cross_validations
 
 ROBOT = pk.load("hexapod")
+EXAMPLES = Path(__file__).parents[2] / "examples"
 TARGETS = np.array([[80.0, 0.0, 60.0], [-40.0, 70.0, 60.0], [-40.0, -70.0, 60.0]])
 
 
@@ -168,3 +171,62 @@ def test_touches_of_one_height_have_no_scale(seed):
     assert found.converged
     assert not any("scale of the instrument" in str(each) for each in found.verdict.said)
     assert "scale" not in {each.name for each, _ in possible(found.fit)}
+
+
+def cables(seed, drive=lambda q: q):
+    """Offsets of a platform on eight cables, which are more than its ways to move."""
+    robot, random = (
+        pk.load(str(EXAMPLES / "cable-robot" / "robot.toml")),
+        np.random.default_rng(seed),
+    )
+    poses = robot.home + random.uniform(-1, 1, (40, 6)) * [800, 600, 450, 0.08, 0.08, 0.08]
+    q = robot.inverse(poses)
+    read = poses + random.normal(size=poses.shape) * ([0.1] * 3 + [1e-4] * 3)
+    log = drive(q) + random.normal(0.0, 0.1, q.shape)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return pk.identify(robot, pk.Measurements(log, read, "pose"), "offset*")
+
+
+def played_actuators(seed):
+    """Offsets of a hexapod whose actuators scatter, read with the direction it came from."""
+    random = np.random.default_rng(seed)
+    q = ROBOT.inverse(pk.sample_poses(ROBOT, 45, seed=seed, share=0.4))
+    m = pk.VirtualMachine(ROBOT, noise=0.01, seed=seed).measure(
+        played(q) + random.normal(0.0, 0.02, q.shape), "pose"
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return pk.identify(ROBOT, replace(m, actuators=q, actuator_sigma=0.02), "offset*")
+
+
+@pytest.mark.parametrize(
+    ("made", "name"),
+    [
+        (lambda seed: cables(seed, lambda q: q * (1.0 + 4e-4 * (-1.0) ** np.arange(8))), "gains"),
+        (lambda seed: cables(seed, lambda q: q - 6.0 * (q - played(q))), "play"),
+        (played_actuators, "play"),
+    ],
+)
+def test_causes_are_named_where_poses_are_found_along(made, name):
+    for seed in range(3):
+        (first, *_) = found_causes(made(seed))
+        assert any(name in each for each in (first.name, *first.also))
+
+
+@pytest.mark.parametrize("made", [cables, played_actuators])
+def test_columns_of_mixtures_are_those_of_the_design(made):
+    """Of actuators that are longer by 1, as the fit has them of their offsets."""
+    fit = made(1).fit
+    sure, count = fit.uncertainty, fit.estimate.evaluation.actuators.shape[1]
+    assert sure.mixed
+    columns = of_actuators(fit, lambda poses: np.repeat(np.eye(count)[None], len(poses), axis=0))
+    own = np.concatenate([some for _, some in columns()])
+    design = sure.equations.by_parameters(fit.estimate.evaluation, sure.factors)
+    mine = [fit.parameters.names.index(f"offset{i}") for i in range(1, count + 1)]
+    np.testing.assert_allclose(own, design[:, mine], rtol=0, atol=2e-3 * np.abs(design).max())
+
+
+def test_of_sound_cables_hardly_any_cause_is_named():
+    named = sum(bool(found_causes(cables(seed))) for seed in range(50, 70))
+    assert named <= 3  # 5 of 100 are allowed: 4 or more of 20 in 1 of 60 trials
