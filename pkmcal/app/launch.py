@@ -12,6 +12,7 @@ from pathlib import Path
 
 import uvicorn
 
+from pkmcal.app.claim import CLAIM, ClaimedError, claimed
 from pkmcal.app.folder import Folder
 from pkmcal.app.server import guarded
 
@@ -30,7 +31,7 @@ def launch(
     port: int = 0,
     testing: bool = False,
 ) -> None:
-    """Serve the project of a folder until it is interrupted.
+    """Serve the project of a folder until it is interrupted; one that is served already is shown.
 
     Parameters
     ----------
@@ -46,11 +47,26 @@ def launch(
     Raises
     ------
     ValueError
-        A project file with a mistake.
+        A project file with a mistake, or a folder that another process serves and no browser is to
+        show.
     OSError
         The port is taken.
     """
-    folder = Folder(path)
+    path.mkdir(parents=True, exist_ok=True)
+    try:
+        with claimed(path):
+            _serve(Folder(path), say, browser, port, testing)
+    except ClaimedError:
+        door = path.resolve() / DOOR
+        if not browser or not door.is_file():
+            raise
+        webbrowser.open(door.as_uri())
+        say(f"{path.resolve()}\nits window is open already; the browser shows it")
+
+
+def _serve(
+    folder: Folder, say: Callable[[str], object], browser: bool, port: int, testing: bool
+) -> None:
     token = secrets.token_urlsafe(24)
     with contextlib.closing(socket.socket(socket.AF_INET, socket.SOCK_STREAM)) as listening:
         listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -83,3 +99,5 @@ def _door(folder: Path, url: str, browser: bool) -> Iterator[None]:
         yield
     finally:
         path.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # Windows keeps a file that is open
+            (folder / CLAIM).unlink()

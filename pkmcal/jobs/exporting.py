@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -11,7 +12,7 @@ from pkmcal.arguments import word
 from pkmcal.arms.arm import SerialArm
 from pkmcal.controllers.linuxcnc import contents
 from pkmcal.controllers.loss import Loss, laws
-from pkmcal.exceptions import ArgumentError
+from pkmcal.exceptions import ArgumentError, Error
 from pkmcal.files.reading import Input
 from pkmcal.jobs.configuration import Exporting
 from pkmcal.jobs.inputs import Inputs
@@ -22,6 +23,12 @@ from pkmcal.loading import load, load_parallel
 _OF_ARMS = ("urdf", "sdf", "dh", "dh-modified", "ur")
 _FIRMWARE = ("klipper", "reprap", "marlin", "hangprinter", "maslow")
 TARGETS = ("c", *_FIRMWARE, "linuxcnc", "mjcf", "fmu", *_OF_ARMS)
+_CALLED = {
+    "c": "C header", "klipper": "Klipper, Kalico", "reprap": "RepRapFirmware", "marlin": "Marlin",
+    "hangprinter": "Hangprinter", "maslow": "Maslow", "linuxcnc": "LinuxCNC", "mjcf": "MuJoCo",
+    "fmu": "FMU", "urdf": "URDF", "sdf": "SDF", "dh": "Denavit–Hartenberg table",
+    "dh-modified": "modified Denavit–Hartenberg table", "ur": "Universal Robots",
+}  # fmt: skip
 _IN_A_FILE = ("klipper", "maslow", "reprap", "hangprinter")  # of the user's
 
 
@@ -76,6 +83,27 @@ def run(job: Exporting, inputs: Inputs, force: bool) -> Exported:
     with Output(out.parent, [out.name], inputs, force).draft() as draft:
         written = _write(target, machine, draft / out.name, job.number, given, job.project)
     return Exported(machine.name, written)
+
+
+def offered(machine: Robot | SerialArm) -> dict[str, str]:
+    """What a machine can be written for, with its name: firmwares are those that can hold it."""
+    if isinstance(machine, SerialArm):
+        return {target: _CALLED[target] for target in _OF_ARMS}
+    general = [target for target in TARGETS if target not in (*_FIRMWARE, *_OF_ARMS)]
+    return {
+        target: _CALLED[target]
+        for target in TARGETS
+        if target in general or (target in _FIRMWARE and _held_by(target, machine))
+    }
+
+
+def _held_by(firmware: str, machine: Robot) -> bool:
+    with tempfile.TemporaryDirectory(prefix="pkmcal-") as folder:
+        try:
+            _write(firmware, machine, Path(folder) / "numbers", None, None, False)
+        except Error:
+            return False
+    return True
 
 
 def _export_arm(

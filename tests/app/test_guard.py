@@ -28,7 +28,7 @@ PAGES = (
     "/transport.js",
     "/app.css",
     "/view.js",
-    "/view.css",
+    "/numbers.js",
     "/wasm/limbs",
 )
 

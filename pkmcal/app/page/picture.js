@@ -24,7 +24,7 @@ export async function draw(parent, data, picked) {
       const { when, times } = old.machine.calibration
       Object.assign(calibration, { when, times })
     } else {
-      const long = calibration.points.map(p => Math.hypot(...p.after)).sort((a, b) => a - b)
+      const long = calibration.fitted.map(p => Math.hypot(...p.after)).sort((a, b) => a - b)
       calibration.when = 'after' // what is left, not what was
       calibration.times = calibration.rounded(Math.min(1e6, (0.09 * data.size) / (long[Math.floor(0.9 * long.length)] || 1)))
     }
@@ -40,16 +40,16 @@ export async function draw(parent, data, picked) {
   if (pointed) {
     scene.pointed = (x, y, pressed) => {
       pointed(x, y)
-      if (pressed && calibration.named) picked?.(calibration.named.row)
+      if (pressed && calibration.named) picked?.(calibration.named.key)
     }
   }
   return root
 }
 
 // Name the residual of a row in the picture, as if it were pointed at.
-export function selected(row) {
+export function selected(key) {
   const calibration = app.picture?.machine?.calibration
   if (!calibration) return
-  calibration.named = calibration.points.find(p => p.row === row) ?? null
+  calibration.named = calibration.points.find(p => p.key === key) ?? null
   calibration.redraw()
 }
