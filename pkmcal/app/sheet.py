@@ -22,7 +22,8 @@ def sheet(made: Plan) -> dict[str, Any]:
     """
     if isinstance(made.robot, SerialArm):
         names = [f"q{i + 1}" for i in range(made.robot.n_joints)]
-        given, units = made.actuators, list(made.robot.actuator_units)
+        given = made.actuators
+        units: list[str] = list(made.robot.actuator_units)
     else:
         names, given, units = list(POSE), made.poses, ["mm"] * 3 + ["rad"] * 3
     kept = [k for k in range(len(names)) if np.any(given[:, k])]

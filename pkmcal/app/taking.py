@@ -34,10 +34,7 @@ _TABLES = (".csv", ".tsv", ".xlsx")
 _MAINS = ("printer.cfg", "config.g", "maslow.yaml")  # which run or include others
 _LOOKED_AT = 4_000_000  # bytes of a file
 _LENS = ("camera_matrix", "distortion_coefficients", "cameraMatrix")  # of OpenCV and of ROS
-_BESIDE = {  # of measurements: the option of a `Reading`, and what the file is
-    "camera": ("camera", "the lens of the camera"),
-    "columns": ("columns", "what the columns of the measurements are"),
-}
+_BESIDE = {"camera": "the lens of the camera", "columns": "what the measured columns are"}
 
 
 @dataclass(frozen=True)
@@ -153,11 +150,12 @@ def taken(project: Project, names: Sequence[str]) -> Taken:
         found = _with_measurements(found, measured)
     for name, kind in kinds.items():
         if kind in _BESIDE:
-            option, said = _BESIDE[kind]
             job = found.project.calibration
-            job = replace(job, reading=replace(job.reading, **{option: name}))
+            lens, columns = job.reading.camera, job.reading.columns
+            lens, columns = (name, columns) if kind == "camera" else (lens, name)
+            job = replace(job, reading=replace(job.reading, camera=lens, columns=columns))
             project = replace(found.project, calibration=job)
-            found = Taken(project, (*found.said, f"{printable(name)}: {said}"))
+            found = Taken(project, (*found.said, f"{printable(name)}: {_BESIDE[kind]}"))
     return found
 
 

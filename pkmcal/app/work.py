@@ -96,7 +96,7 @@ class Work:
 
 
 def take(work: Work, state: Table, given: Table, say: Say) -> Table:
-    """Take files, or a built-in machine, into the project: its new table, and what there is to say."""
+    """Take files, or a built-in machine, into the project, and say what became of it."""
     project = Project.of_table(state)
     if "builtin" in given:
         taken = taking.with_machine(project, str(given["builtin"]))
@@ -301,7 +301,7 @@ def own_export(controller: Controller, robot: str) -> Exporting:
 
 
 def _lines(name: str, at: int = 0) -> list[tuple[int, str]]:
-    """Return the first lines of a file with their numbers, and those around one, whatever is in it."""
+    """Return a file's first lines with their numbers, and those around one, whatever is in it."""
     first = range(1, _LINES + 1)
     shown = {*first, *range(at - _AROUND, at + _AROUND + 1)} if at > _LINES else {*first}
     found = list[tuple[int, str]]()

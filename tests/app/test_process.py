@@ -143,6 +143,7 @@ def test_a_process_that_waits_takes_the_place_of_one_that_is_ended(tmp_path: Pat
         assert "result" in lines(served, "machine")[-1]
 
 
+@pytest.mark.slow
 def test_after_twenty_stops_and_crashes_nothing_is_left(tmp_path: Path) -> None:
     seen = set[int]()
     with browser.served(tmp_path / "project") as served:
