@@ -9,6 +9,7 @@ import socket
 import webbrowser
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import FrameType
 
 import uvicorn
 
@@ -75,12 +76,25 @@ def _serve(
         port = listening.getsockname()[1]
         url = f"http://{HOST}:{port}/#t={token}"
         door = _door(folder.path, url, browser)
+        application, end = guarded(folder, port, token, door, testing)
         config = uvicorn.Config(
-            guarded(folder, port, token, door, testing), log_level="error", access_log=False,
+            application, log_level="error", access_log=False,
             proxy_headers=False, server_header=False, timeout_graceful_shutdown=1, lifespan="on",
         )  # fmt: skip
         say(f"{folder.path}\n{url}")
-        uvicorn.Server(config).run(sockets=[listening])
+        _Ending(config, end).run(sockets=[listening])
+
+
+class _Ending(uvicorn.Server):
+    """A server that ends the streams of its pages when it is asked to end, and waits for none."""
+
+    def __init__(self, config: uvicorn.Config, end: Callable[[], None]) -> None:
+        super().__init__(config)
+        self._end = end
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        super().handle_exit(sig, frame)
+        self._end()
 
 
 @contextlib.contextmanager

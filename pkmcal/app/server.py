@@ -11,7 +11,7 @@ import json
 import os
 import secrets
 import tempfile
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -50,7 +50,7 @@ class Server:
         door: contextlib.AbstractContextManager[None],
     ) -> None:
         self._folder, self._worker, self._operations, self._door = folder, worker, operations, door
-        self._listeners: set[asyncio.Queue[Message]] = set()
+        self._listeners: set[asyncio.Queue[Message | None]] = set()
         self._running: dict[str, asyncio.Event] = {}
 
     def application(self) -> Starlette:
@@ -234,17 +234,28 @@ class Server:
         return _streamed(self._events())
 
     async def _events(self) -> AsyncIterator[bytes]:
-        queue: asyncio.Queue[Message] = asyncio.Queue()
+        queue: asyncio.Queue[Message | None] = asyncio.Queue()
         self._listeners.add(queue)
         try:
             yield _line({"version": self._folder.version})
             while True:
                 try:
-                    yield _line(await asyncio.wait_for(queue.get(), _SILENT))
+                    told = await asyncio.wait_for(queue.get(), _SILENT)
                 except asyncio.TimeoutError:
                     yield b"\n"
+                    continue
+                if told is None:
+                    return
+                yield _line(told)
         finally:
             self._listeners.discard(queue)
+
+    def end(self) -> None:
+        """End what is streamed to pages: the server is about to end."""
+        for queue in self._listeners:
+            queue.put_nowait(None)
+        for stopped in self._running.values():
+            stopped.set()
 
     async def download(self, request: Request) -> Response:
         """A file of the folder, never shown by the browser itself."""
@@ -273,11 +284,14 @@ def guarded(
     token: str,
     door: contextlib.AbstractContextManager[None],
     testing: bool = False,
-) -> Application:
-    """Return the whole application: routes behind the guard; `door` is open while it is there."""
+) -> tuple[Application, Callable[[], None]]:
+    """Return the whole application, routes behind the guard, and what ends its streams.
+
+    `door` is open while it is there.
+    """
     operations = OPERATIONS + FOR_TESTS * testing
     server = Server(folder, Worker(folder.path), operations, door)
-    return Guard(server.application(), port, token)
+    return Guard(server.application(), port, token), server.end
 
 
 class _TooLarge(Exception):

@@ -26,12 +26,13 @@ def sheet(made: Plan) -> dict[str, Any]:
         units: list[str] = list(made.robot.actuator_units)
     else:
         names, given, units = list(POSE), made.poses, ["mm"] * 3 + ["rad"] * 3
-    kept = [k for k in range(len(names)) if np.any(given[:, k])]
-    head = [f"{names[k]} [{displayed(0.0, units[k])[1]}]" for k in kept]
-    rows = [
-        [str(i + 1), *(fixed(displayed(float(row[k]), units[k])[0], _DECIMALS) for k in kept)]
-        for i, row in enumerate(given)
+    cells = [
+        [fixed(displayed(float(value), unit)[0], _DECIMALS) for value in column]
+        for column, unit in zip(given.T, units, strict=True)
     ]
+    kept = [k for k, column in enumerate(cells) if any(float(cell) for cell in column)]
+    head = [f"{names[k]} [{displayed(0.0, units[k])[1]}]" for k in kept]
+    rows = [[str(i + 1), *(cells[k][i] for k in kept)] for i in range(len(given))]
     kinds = list(dict.fromkeys(made.kinds))
     if len(kinds) > 1:
         head.append("measure")
