@@ -22,7 +22,6 @@ Table = dict[str, Any]
 WAYS = ("auto", "name", "time", "row", "row+1", "row-1")  # in which rows of a log may be found
 _MOST_JOINED = 2_000_000  # bytes of files that are joined in all ways, for a look at each
 _PREVIEW = 5  # rows
-_STATED = {"heading": "its heading", "options": "the units stated here"}
 
 
 def columns(measured: Sequence[Measurements]) -> list[Table]:
@@ -81,10 +80,10 @@ def _joined(way: str, job: Calibration, machine: Calibratable, inputs: Inputs) -
     try:
         for name in job.files:
             read = read_file(name, machine, reading, inputs, lambda note: None)
-            said += [note for note in read.notes if "joined with" in note]
+            said += [note.partition(": ")[2] for note in read.notes if "joined with" in note]
             shown.append(str(read.select(range(min(_PREVIEW, len(read))))))
     except (Error, OSError) as error:
-        return {"way": way, "said": str(error), "text": ""}
+        return {"way": way, "said": str(error).partition("; ")[2] or str(error), "text": ""}
     return {"way": way, "said": "; ".join(said), "text": "\n".join(shown)}
 
 
@@ -93,7 +92,11 @@ def _said(each: Understood) -> str:
         return "left out"
     if each.unit is None:
         return f"read as {each.meaning}"
-    stated = _STATED.get(each.unit_from) or (
-        each.unit_from if each.unit_from.startswith("line ") else f"column {each.unit_from}"
-    )
+    if each.unit_from == "heading":
+        return f"read as {each.meaning} in {each.unit}"
+    stated = each.unit_from
+    if stated == "options":
+        stated = "the units stated here"
+    elif not stated.startswith("line "):
+        stated = f"column {stated}"
     return f"read as {each.meaning} in {each.unit}, the unit of {stated}"

@@ -174,7 +174,7 @@ def with_machine(project: Project, robot: str, importing: Importing | None = Non
     before = project.calibration
     files = tuple(each for each in before.files if Path(each).parts[0] != IMPORTED)
     new = Project(Calibration(robot, files, before.reading), importing=importing)
-    said = [f"the machine is {_called(new)}"]
+    said = [f"machine: {_called(new)}"]
     if before.robot:
         kept = replace(before, robot=robot, files=files)
         if (kept, replace(project.plan, robot=robot), project.targets) != _asked(new):
@@ -229,4 +229,4 @@ def _configuration(project: Project) -> str | None:
 def _called(project: Project) -> str:
     """The machine of a project as the user knows it."""
     robot = project.calibration.robot
-    return robot if is_built_in(robot) else f"that of {printable(_configuration(project) or robot)}"
+    return robot if is_built_in(robot) else printable(_configuration(project) or robot)

@@ -77,7 +77,7 @@ def calibration(found: Identification, job: Calibration, lines: Lines) -> Table:
     """
     verdict, free = found.verdict, set(found.free)
     names = list(as_machine(found.robot).geometry.names)
-    rows, arrows = _rows(found, lines)
+    rows, arrows = _rows(found, lines, _dropped(job))
     return {
         "name": found.robot.name,
         "verdict": {
@@ -118,11 +118,18 @@ def _said(said: Any, job: Calibration) -> Table:
     }
 
 
-def _rows(found: Identification, lines: Lines) -> tuple[list[Table], list[Table]]:
+def _dropped(job: Calibration) -> set[str]:
+    """What is left out by name."""
+    return {part.strip() for each in job.drop for part in each.split(",")}
+
+
+def _rows(
+    found: Identification, lines: Lines, dropped: set[str]
+) -> tuple[list[Table], list[Table]]:
     """Return all rows, those left out first and then the worst, and those with a place, as drawn.
 
-    A row is left out by its number, for a line may have several; of a file that is held out it has
-    only its line.
+    A row is left out by its key, its number, for a line may have several; of a file that is held
+    out by `drop`, its line. `use` and `said` are there where a row is not as most are.
     """
     listed = every_row(found)
     elsewhere = bool(lines.held)
@@ -135,12 +142,17 @@ def _rows(found: Identification, lines: Lines) -> tuple[list[Table], list[Table]
         of = lines.held if held else lines.measured
         file, line = of[row] if row < len(of) else ("", -1)
         by_line = f"{file}:{line}" if line > 0 else None
-        one = {
-            "key": f"held {row}" if held else str(row), "drop": by_line if held else str(row),
-            "line": by_line, "name": listed.name[k], "use": use,
-            "said": "outlier" if listed.outlier[k] else "" if use == "fitted" else use,
-            "before": _number(listed.off_before[k], 5), "after": _number(listed.off[k], 5),
-        }  # fmt: skip
+        one: Table = {"key": f"held {row}" if held else str(row), "name": listed.name[k],
+                      "before": _number(listed.off_before[k], 4),
+                      "after": _number(listed.off[k], 4)}  # fmt: skip
+        if held:
+            one["drop"] = by_line
+        if by_line in dropped:
+            one["line"] = by_line
+        if use != "fitted":
+            one["use"] = use
+        if listed.outlier[k] or use != "fitted":
+            one["said"] = "outlier" if listed.outlier[k] else use
         told.append(one)
         vectors = [listed.at[k], listed.before[k], listed.after[k]]
         if np.isfinite(vectors).all():

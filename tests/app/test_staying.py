@@ -53,7 +53,7 @@ def test_two_files_of_machines_are_both_told_of_and_either_can_be_had(tmp_path: 
         page.set_input_files("input[type=file]", files)
         page.locator("#said", has_text="second.toml is kept in the project").wait_for()
         page.get_by_role("button", name="second.toml", exact=True).click()
-        page.locator("#said", has_text="the machine is that of second.toml").wait_for()
+        page.locator("#said", has_text="machine: second.toml").wait_for()
         assert 'file = "second.toml"' in (served.folder / "project.toml").read_text()
 
 

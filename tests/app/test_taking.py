@@ -75,7 +75,7 @@ def test_another_machine_keeps_what_was_measured_and_says_what_is_gone(folder: P
     assert found.project == Project(Calibration("mine.toml", ("t.csv",)))
     said = " ".join(found.said)
     assert "printer.cfg is gone" in said and "t.csv" in said
-    assert with_machine(Project(), "hexapod").said == ("the machine is hexapod",)
+    assert with_machine(Project(), "hexapod").said == ("machine: hexapod",)
 
 
 def test_the_machine_itself_read_again_keeps_what_is_asked_of_it(folder: Path) -> None:

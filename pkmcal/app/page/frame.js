@@ -129,6 +129,7 @@ async function changing(edit) {
 }
 
 export async function undo() {
+  said([])
   if (await taken(await server.undo(app.project.version))) await refresh()
 }
 

@@ -39,15 +39,16 @@ function describe(about, found) {
   for (const note of found.notes) made('p', about, { className: 'note', text: note })
   const { import: importing } = app.project.state
   if (importing)
-    choice(about, `${importing.file} is of`, [['', 'the firmware that stands in it'], ...found.firmwares.map(one => [one, one])], importing.from ?? '', async firmware => {
+    choice(made('div', about), `${importing.file} is of`, [['', 'the firmware that stands in it'], ...found.firmwares.map(one => [one, one])], importing.from ?? '', async firmware => {
       await change(({ import: asked }) => { if (firmware) asked.from = firmware; else delete asked.from }) && await refresh()
     })
   for (const { what, suggestion } of found.findings) made('p', about, { className: 'warn', text: `${what}: ${suggestion}` })
   if (found.error) return
+  const next = made('div', about, { className: 'choices' })
   if (found.stored.length)
-    button(about, 'Calibrate with what it has stored', async () => {
+    button(next, 'Calibrate with what it has stored', async () => {
       await change(table => { table.measured = { files: found.stored } }) && await go('result')
     }, { className: 'first' })
-  button(about, 'Plan a measurement', () => go('plan'))
-  button(about, 'I have measurements', () => go('measure'))
+  button(next, 'Plan a measurement', () => go('plan'))
+  button(next, 'I have measurements', () => go('measure'))
 }

@@ -5,7 +5,7 @@ import { again, app, button, change, choice, field, go, made, refresh, tick, wor
 export async function measure(main) {
   made('h1', main, { text: 'What was measured' })
   const split = made('div', main, { className: 'split' })
-  const seen = made('div', split), side = made('div', split)
+  const side = made('div', split), seen = made('div', split)
   const understood = made('div', seen), read = made('div', seen), raw = made('div', seen)
   dropping(side, 'or drop anywhere here what the instrument wrote, and the log of the controller')
   const list = made('ul', side, { className: 'files' }), asked = made('div', side), joins = made('div', side), next = made('div', side)

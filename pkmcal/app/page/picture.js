@@ -4,7 +4,7 @@ import { app, made } from './frame.js'
 
 const cores = {}
 
-// Draw a machine; where one was drawn before, the look at it and what is shown stay.
+// Draw a machine; where it was drawn before, the look at it and what is shown stay.
 export async function draw(parent, data, picked) {
   const old = app.picture?.isConnected && app.picture.parentElement === parent ? app.picture : null
   const { start } = await import('/view.js')
@@ -13,14 +13,16 @@ export async function draw(parent, data, picked) {
   if (old) old.replaceWith(root)
   else parent.replaceChildren(root)
   app.picture = root
+  const same = old?.machine?.name === data.name
   await start(root, { ...data, wasm: cores[data.kind] })
   const { scene, calibration } = root.machine
+  root.machine.name = data.name
   root.machine.dispose = () => {
     scene.dark.removeEventListener('change', scene.redraw)
     scene.observer.disconnect()
   }
   if (calibration?.points.length) {
-    if (old?.machine.calibration?.points.length) {
+    if (same && old.machine.calibration?.points.length) {
       const { when, times } = old.machine.calibration
       Object.assign(calibration, { when, times })
     } else {
@@ -30,11 +32,11 @@ export async function draw(parent, data, picked) {
     }
     calibration.update(false)
   }
-  if (old) {
+  if (same) {
     const { turn, tilt, zoom, room, centre, radius, floor, points, fitted, tilted } = old.machine.scene
     Object.assign(scene, { turn, tilt, zoom, room, centre, radius, floor, points, fitted, tilted })
-    old.machine.dispose()
   }
+  old?.machine?.dispose()
   root.machine.changed(false)
   const pointed = scene.pointed
   if (pointed) {

@@ -50,8 +50,9 @@ export async function plan(main) {
     const found = await work('plan', 'choosing poses')
     const split = made('div', null, { className: 'split' })
     again(answer, () => {
-      for (const file of found.files) button(answer, `Save ${file}`, () => save(file), { className: 'first' })
-      button(answer, 'Print a sheet to fill in', () => print())
+      const takes = made('div', answer, { className: 'choices' })
+      for (const file of found.files) button(takes, `Save ${file}`, () => save(file), { className: 'first' })
+      button(takes, 'Print a sheet to fill in', () => print())
       answer.append(split)
       made('pre', split, { text: found.text, tabindex: 0 })
       sheet(answer, found.sheet)

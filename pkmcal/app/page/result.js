@@ -44,6 +44,7 @@ export async function result(main) {
 
   const show = async () => {
     const found = await work('fit', 'calibrating')
+    for (const row of found.rows) Object.assign(row, { use: row.use ?? '', said: row.said ?? '', drop: row.drop === undefined ? row.key : row.drop })
     app.found = found
     again(verdict, () => say(verdict, found, refit))
     again(settings, () => held(settings, refit))
@@ -118,7 +119,7 @@ function rows(parent, found, list, refit, name) {
   made('caption', table, { text: 'Measured rows: the distance from where the machine is, mm' })
   made('tr', table, {}, ...['use', 'row', 'before', 'after', ''].map(text => made('th', null, { text, scope: 'col' })))
   for (const each of shown) {
-    const line = made('tr', table, { className: each.use !== 'fitted' ? 'out' : each.said ? 'odd' : '', id: `row ${each.key}` })
+    const line = made('tr', table, { className: each.use ? 'out' : each.said ? 'odd' : '', id: `row ${each.key}` })
     if (list.named === each.key) line.classList.add('named')
     made('td', line, {}, use(each, refit))
     const show = button(made('td', line), each.name, () => name(each.key, 'list'), { className: 'plain', 'aria-label': `show ${each.name}` })
