@@ -24,7 +24,7 @@ _REST = 0.5  # s without a request, after which the next process is started
 
 
 class Worker:
-    """One process at a time; requests wait for each other.
+    """A process that computes, one at a time; requests wait for each other.
 
     Once it has answered, a second process is started, which has imported everything when the first
     is ended: work goes on at once.

@@ -1,4 +1,4 @@
-"""What the window computes: a machine, a plan, files as read, a fit, what is taken away.
+"""The computations of the window: machine, plan, files as read, fit, rows taken away.
 
 Each operation takes the table of the project and what the page gives besides, and returns plain
 data. Words of results are those of the package.
@@ -48,7 +48,7 @@ _LONGEST = 2000  # bytes of a line that are shown
 
 @dataclass
 class Work:
-    """What was read and fitted last, to be quicker.
+    """A cache of what was read and fitted last.
 
     Attributes
     ----------
