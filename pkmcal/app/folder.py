@@ -140,7 +140,8 @@ class Folder:
         if _is_own(name):
             name = f"my_{name}"
         place, former = self.path / name, None
-        if place.is_file() and not filecmp.cmp(place, content, shallow=False):
+        own = place.is_file() and not place.is_symlink()  # a link goes, what it leads to stays
+        if own and not filecmp.cmp(place, content, shallow=False):
             former = self._free(place)
             shutil.copy2(place, former)
         content.replace(place)

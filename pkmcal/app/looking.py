@@ -25,7 +25,7 @@ _PREVIEW = 5  # rows
 
 
 def columns(measured: Sequence[Measurements]) -> list[Table]:
-    """What was made of each column of files that could be read."""
+    """Return what was made of each column of files that could be read."""
     found: dict[tuple[str, str], Understood] = {}
     for each in measured:
         for one in each.understood:
@@ -53,18 +53,18 @@ def _headings(name: str) -> Iterator[Table]:
 
 
 def meanings(machine: Calibratable) -> list[str]:
-    """Names that a column may be read as."""
+    """Return names that a column may be read as."""
     drives = (f"q{i + 1}" for i in range(len(machine.actuator_units)))
     return list(dict.fromkeys([*drives, *KNOWN_NAMES]))
 
 
 def units() -> list[str]:
-    """Units that a column may have."""
+    """Return units that a column may have."""
     return list(dict.fromkeys(unit for of in UNITS.values() for unit in of if unit.isalnum()))
 
 
 def joins(job: Calibration, machine: Calibratable, inputs: Inputs) -> list[Table]:
-    """What each way of joining with the controller's log gives: its words, and its first rows."""
+    """Return what each way of joining with a log gives: its words, and its first rows."""
     log = job.reading.controller
     if log is None:
         return []

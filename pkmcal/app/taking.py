@@ -1,4 +1,4 @@
-"""What files are that were given to a window: a machine, its configuration, or measurements.
+"""Take files that are given to a window: a machine, its configuration, or measurements.
 
 It is the same wherever they are dropped, so that measurements never take a machine's place.
 """
@@ -46,7 +46,7 @@ class Taken:
 
 
 def kind_of(path: Path) -> Kind:
-    """What a file is, by its ending and, where that does not tell, by what stands in it.
+    """Return what a file is, by its ending and, where that does not tell, by what stands in it.
 
     Raises
     ------
@@ -79,7 +79,7 @@ def kind_of(path: Path) -> Kind:
 
 
 def may_be_machine(name: str) -> bool:
-    """Whether a file may be offered as another machine: not what pkmcal wrote, nor a project."""
+    """Return whether a file may be offered as another machine: not a file of pkmcal's own."""
     if name.startswith("new.") or Path(name).suffix.lower() not in (*_MACHINES, ".toml", ".cfg"):
         return False
     return kind_of(Path(name)) in ("machine", "configuration") and name != "certificate.toml"

@@ -119,7 +119,7 @@ def _said(said: Any, job: Calibration) -> Table:
 
 
 def _dropped(job: Calibration) -> set[str]:
-    """What is left out by name."""
+    """Return the rows that are left out, as they are named."""
     return {part.strip() for each in job.drop for part in each.split(",")}
 
 

@@ -87,7 +87,7 @@ class Work:
         return self.found
 
     def lines(self, project: Project) -> telling.Lines:
-        """Where the rows of a calibration stand in its files."""
+        """Return where the rows of a calibration stand in its files."""
         sources = self.read(project)
         held = [] if sources.held is None else telling.lines_of(sources.held)
         return telling.Lines(
@@ -101,7 +101,10 @@ def take(work: Work, state: Table, given: Table, say: Say) -> Table:
     if "builtin" in given:
         taken = taking.with_machine(project, str(given["builtin"]))
     else:
-        taken = taking.taken(project, [_in_folder(name) for name in given["files"]])
+        names = given.get("files")
+        if not isinstance(names, list):
+            raise ArgumentError("files: a list of names is needed")
+        taken = taking.taken(project, [_in_folder(name) for name in names])
     return {"state": taken.project.table(), "said": list(taken.said)}
 
 

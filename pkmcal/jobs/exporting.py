@@ -86,7 +86,7 @@ def run(job: Exporting, inputs: Inputs, force: bool) -> Exported:
 
 
 def offered(machine: Robot | SerialArm) -> dict[str, str]:
-    """What a machine can be written for, with its name: firmwares are those that can hold it."""
+    """Return what a machine can be written for, with names; of firmwares those that hold it."""
     if isinstance(machine, SerialArm):
         return {target: _CALLED[target] for target in _OF_ARMS}
     general = [target for target in TARGETS if target not in (*_FIRMWARE, *_OF_ARMS)]

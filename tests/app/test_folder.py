@@ -29,6 +29,15 @@ def test_another_file_of_the_same_name_keeps_the_one_before(tmp_path: Path) -> N
     assert kept == {"t.csv": "wednesday", "t.1.csv": "monday", "t.2.csv": "tuesday"}
 
 
+def test_a_file_takes_the_place_of_a_link_and_nothing_is_read_through_it(tmp_path: Path) -> None:
+    (tmp_path / "secret").write_text("secret")
+    folder = Folder(tmp_path / "project")
+    (folder.path / "t.csv").symlink_to(tmp_path / "secret")
+    assert folder.store("t.csv", sent(folder, "mine")) == ("t.csv", None)
+    assert not (folder.path / "t.csv").is_symlink()
+    assert (tmp_path / "secret").read_text() == "secret"
+
+
 def test_what_somebody_writes_into_the_file_is_not_written_over(tmp_path: Path) -> None:
     folder = Folder(tmp_path)
     assert folder.change(HEXAPOD, 1)

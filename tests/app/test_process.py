@@ -109,7 +109,7 @@ def test_an_error_of_the_users_is_in_words_with_file_and_line(tmp_path: Path) ->
         assert ask(served, "POST", "/api/state", body)[0] == 200
         found = lines(served, "look")[-1]["result"]
         assert "broken.csv" in found["error"]["message"]
-        assert found["files"]["broken.csv"][0] == "q1 [mm],x [mm]"
+        assert found["files"]["broken.csv"][0] == [1, "q1 [mm],x [mm]"]
         assert "broken.csv" in lines(served, "fit")[-1]["error"]["message"]
 
 

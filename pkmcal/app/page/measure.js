@@ -101,7 +101,7 @@ function columns(parent, { columns, meanings, units }) {
     const mine = columns.filter(({ file }) => file === name)
     const box = made('details', parent, { open: mine.length < 12 }, made('summary', null, { text: `What the ${mine.length} columns of ${name} are` }))
     const table = made('table', made('div', box, { className: 'wide' }), { className: 'columns' })
-    made('tr', table, {}, ...['heading', 'is', 'unit', ''].map(text => made('th', null, { text, scope: 'col' })))
+    made('tr', table, {}, ...['heading', 'is', 'unit', 'as it was read'].map(text => made('th', null, { text, scope: 'col' })))
     for (const { heading } of mine) {
       const line = made('tr', table), cell = cells[`${name} ${heading}`] = {}
       made('td', line, { text: heading })

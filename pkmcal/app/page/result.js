@@ -117,7 +117,7 @@ function rows(parent, found, list, refit, name) {
   const wide = made('div', parent, { className: 'wide', tabindex: 0, role: 'region', 'aria-label': 'measured rows' })
   const table = made('table', wide)
   made('caption', table, { text: 'Measured rows: the distance from where the machine is, mm' })
-  made('tr', table, {}, ...['use', 'row', 'before', 'after', ''].map(text => made('th', null, { text, scope: 'col' })))
+  made('tr', table, {}, ...['use', 'row', 'before', 'after', 'remark'].map(text => made('th', null, { text, scope: 'col' })))
   for (const each of shown) {
     const line = made('tr', table, { className: each.use ? 'out' : each.said ? 'odd' : '', id: `row ${each.key}` })
     if (list.named === each.key) line.classList.add('named')
