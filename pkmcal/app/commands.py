@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from pathlib import PurePath
+from tempfile import TemporaryDirectory
 
+from pkmcal.arms.arm import SerialArm
+from pkmcal.controllers.target import Target
 from pkmcal.controllers.targets import targets
+from pkmcal.exceptions import Error
 from pkmcal.jobs.calibration import Writing
 from pkmcal.jobs.configuration import Exporting
 from pkmcal.jobs.project import Project
 from pkmcal.jobs.stated import quoted
+from pkmcal.kinematics.robot import Robot
 
 REPORT, PLAN = "report", "plan"  # folders of the calibrated machine, and of planned poses
 OUTPUTS = frozenset(target.file for target in targets().values())
@@ -41,10 +46,17 @@ def export(target: str) -> Exporting:
     return Exporting(str(PurePath(REPORT) / "robot.toml"), target, name)
 
 
-def offered(arm: bool) -> list[tuple[str, str]]:
-    """Return names and labels of the targets that take a serial arm, or a parallel machine."""
-    takes = "arm" if arm else "parallel"
-    every = targets().values()
-    return [
-        (each.name, each.label) for each in every if each.label and each.takes in (takes, "any")
-    ]
+def offered(machine: Robot | SerialArm) -> list[Target]:
+    """Return the targets that the window offers for a machine."""
+    takes = "arm" if isinstance(machine, SerialArm) else "parallel"
+    named = [each for each in targets().values() if each.label and each.takes in (takes, "any")]
+    return [each for each in named if not each.tried or _holds(each, machine)]
+
+
+def _holds(target: Target, machine: Robot | SerialArm) -> bool:
+    with TemporaryDirectory(prefix="pkmcal-") as folder:
+        try:
+            target.export(machine, PurePath(folder) / "numbers")
+        except Error:
+            return False
+    return True

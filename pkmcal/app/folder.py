@@ -6,9 +6,13 @@ that of two tabs that change the same state the second is told.
 
 from __future__ import annotations
 
+import contextlib
+import filecmp
 import json
+import shutil
 import sys
 from collections.abc import Mapping
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +34,7 @@ OWN = frozenset({  # names that are pkmcal's; a user's file gets another
     FILE, "robot.toml", "certificate.toml", PLAN, REPORT, "machine", *OUTPUTS,
 })  # fmt: skip
 MOST_FILE, MOST_FOLDER = 100_000_000, 1_000_000_000  # bytes
+UPLOAD = ".upload-", ".part"  # around the name of a file that is being sent
 _UNDO = 100
 
 
@@ -50,16 +55,42 @@ class Folder:
     def __init__(self, path: Path) -> None:
         path.mkdir(parents=True, exist_ok=True)
         self.path = path.resolve()
-        file = self.path / FILE
-        self.project = _read(file) if file.is_file() else Project()
-        _refuse_elsewhere(self.project)
-        self.version = 1
+        self.project, self.version = Project(), 1
         self._before: list[Project] = []
+        self._content: bytes | None = None  # of the project's file, as it was read or written last
+        self._follow()
+        self._before.clear()
+        for part in self.path.glob("*".join(UPLOAD)):  # of a server that was killed
+            part.unlink(missing_ok=True)
 
     @property
     def files(self) -> list[str]:
         """The user's files, by name."""
         return sorted(each.name for each in self.path.iterdir() if self._is_users(each))
+
+    def follow(self) -> None:
+        """Take over what somebody else has written into the project's file, in an editor.
+
+        Raises
+        ------
+        ValueError
+            A mistake in it, with its line; the state is what it was.
+        """
+        if self._follow():
+            self.version += 1
+
+    def _follow(self) -> bool:
+        try:
+            content = (self.path / FILE).read_bytes()
+        except FileNotFoundError:
+            return False
+        if content == self._content:
+            return False
+        project = _parsed(content, str(self.path / FILE))
+        _refuse_elsewhere(project)
+        self._before = [*self._before, self.project][-_UNDO:]
+        self.project, self._content = project, content
+        return True
 
     def change(self, table: Mapping[str, Any], version: object) -> bool:
         """Take a whole new state, written at once; False where another was first.
@@ -67,12 +98,15 @@ class Folder:
         Raises
         ------
         ValueError
-            A key or value that is none, or a file that is not in the folder.
+            A key or value that is none, a file that is not in the folder, or a mistake that
+            somebody made in the project's file.
         """
+        self.follow()
         if version != self.version:
             return False
         project = Project.of_table(table)
         self._inside(project)
+        self.refuse_links(project)
         if project != self.project:
             self._before = [*self._before, self.project][-_UNDO:]
             self._take(project)
@@ -80,6 +114,7 @@ class Folder:
 
     def undo(self, version: object) -> bool:
         """Go back to the state before; False where there is none or another was first."""
+        self.follow()
         if version != self.version or not self._before:
             return False
         self._take(self._before[-1])
@@ -91,13 +126,47 @@ class Folder:
         """True if there is an earlier state to return to."""
         return bool(self._before)
 
-    def store(self, name: str, content: Path) -> str:
-        """Take a file that was sent, and return the name that it has here."""
+    def store(self, name: str, content: Path) -> tuple[str, str | None]:
+        """Take a file that was sent.
+
+        Returns
+        -------
+        name : str
+            What it is called here.
+        former : str or None
+            What another content that had this name is called now; None where there was none.
+        """
         name = safe_name(name)
         if _is_own(name):
             name = f"my_{name}"
-        content.replace(self.path / name)
-        return name
+        place, former = self.path / name, None
+        own = place.is_file() and not place.is_symlink()  # a link goes, what it leads to stays
+        if own and not filecmp.cmp(place, content, shallow=False):
+            former = self._free(place)
+            shutil.copy2(place, former)
+        content.replace(place)
+        return name, None if former is None else former.name
+
+    def _free(self, place: Path) -> Path:
+        numbered = (place.with_name(f"{place.stem}.{k}{place.suffix}") for k in count(1))
+        return next(each for each in numbered if not each.exists())
+
+    def refuse_links(self, project: Project) -> None:
+        """Refuse symbolic links by which what is written would be written elsewhere.
+
+        Raises
+        ------
+        ValueError
+            With the link's name.
+        """
+        made = Path(project.importing.out).parts[:1] if project.importing else ()
+        for each in self.path.iterdir():
+            if _is_own(each.name) or each.name in made:
+                below = each.rglob("*") if each.is_dir() and not each.is_symlink() else ()
+                for one in (each, *below):
+                    if one.is_symlink() and not self._is_within(one):
+                        name = json.dumps(str(one.relative_to(self.path)))
+                        raise ArgumentError(f"{name} is a link that leads out of this project")
 
     def written(self, path: str) -> Path | None:
         """Return a file of the folder that may be taken away, or None."""
@@ -113,9 +182,16 @@ class Folder:
         """Bytes of all files."""
         return sum(each.lstat().st_size for each in self.path.rglob("*") if each.is_file())
 
+    def _is_within(self, path: Path) -> bool:
+        try:
+            return path.resolve().is_relative_to(self.path)
+        except (OSError, RuntimeError):  # links in a circle
+            return False
+
     def _take(self, project: Project) -> None:
-        write_whole(self.path / FILE, project.text().encode())
-        self.project = project
+        content = project.text().encode()
+        write_whole(self.path / FILE, content)
+        self.project, self._content = project, content
         self.version += 1
 
     def _inside(self, project: Project) -> None:
@@ -132,13 +208,11 @@ class Folder:
         return path.is_file() and not path.name.startswith(".") and path.name != FILE
 
 
-def _read(file: Path) -> Project:
-    """Read a project file; what says where a mistake is takes the packages that compute."""
-    text = file.read_bytes()
-    try:
-        return Project.of_table(tomllib.loads(text.decode()))
-    except ValueError:
-        return Project.of_text(text, str(file))
+def _parsed(content: bytes, place: str) -> Project:
+    """Parse a project file; what says where a mistake is takes the packages that compute."""
+    with contextlib.suppress(ValueError):
+        return Project.of_table(tomllib.loads(content.decode()))
+    return Project.of_text(content, place)
 
 
 def _refuse_elsewhere(project: Project) -> None:
@@ -151,7 +225,8 @@ def _refuse_elsewhere(project: Project) -> None:
 
 
 def _is_own(name: str) -> bool:
-    """Return whether pkmcal writes, or may write, a file or folder of this name."""
+    """Return whether pkmcal writes, or may write, a name, in whatever letters it is spelt."""
+    name = name.casefold()  # as some file systems have it
     return name in OWN or name.startswith(("new.", "for_")) or name.endswith(".part")
 
 

@@ -9,9 +9,11 @@ import socket
 import webbrowser
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import FrameType
 
 import uvicorn
 
+from pkmcal.app.claim import CLAIM, ClaimedError, claimed
 from pkmcal.app.folder import Folder
 from pkmcal.app.server import guarded
 
@@ -30,7 +32,7 @@ def launch(
     port: int = 0,
     testing: bool = False,
 ) -> None:
-    """Serve the project of a folder until it is interrupted.
+    """Serve the project of a folder until it is interrupted; one that is served already is shown.
 
     Parameters
     ----------
@@ -46,11 +48,26 @@ def launch(
     Raises
     ------
     ValueError
-        A project file with a mistake.
+        A project file with a mistake, or a folder that another process serves and no browser is to
+        show.
     OSError
         The port is taken.
     """
-    folder = Folder(path)
+    path.mkdir(parents=True, exist_ok=True)
+    try:
+        with claimed(path):
+            _serve(Folder(path), say, browser, port, testing)
+    except ClaimedError:
+        door = path.resolve() / DOOR
+        if not browser or not door.is_file():
+            raise
+        webbrowser.open(door.as_uri())
+        say(f"{path.resolve()}\nits window is open already; the browser shows it")
+
+
+def _serve(
+    folder: Folder, say: Callable[[str], object], browser: bool, port: int, testing: bool
+) -> None:
     token = secrets.token_urlsafe(24)
     with contextlib.closing(socket.socket(socket.AF_INET, socket.SOCK_STREAM)) as listening:
         listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -59,12 +76,25 @@ def launch(
         port = listening.getsockname()[1]
         url = f"http://{HOST}:{port}/#t={token}"
         door = _door(folder.path, url, browser)
+        application, end = guarded(folder, port, token, door, testing)
         config = uvicorn.Config(
-            guarded(folder, port, token, door, testing), log_level="error", access_log=False,
+            application, log_level="error", access_log=False,
             proxy_headers=False, server_header=False, timeout_graceful_shutdown=1, lifespan="on",
         )  # fmt: skip
         say(f"{folder.path}\n{url}")
-        uvicorn.Server(config).run(sockets=[listening])
+        _Ending(config, end).run(sockets=[listening])
+
+
+class _Ending(uvicorn.Server):
+    """A server that ends the streams of its pages when it is asked to end, and waits for none."""
+
+    def __init__(self, config: uvicorn.Config, end: Callable[[], None]) -> None:
+        super().__init__(config)
+        self._end = end
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        super().handle_exit(sig, frame)
+        self._end()
 
 
 @contextlib.contextmanager
@@ -83,3 +113,5 @@ def _door(folder: Path, url: str, browser: bool) -> Iterator[None]:
         yield
     finally:
         path.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # Windows keeps a file that is open
+            (folder / CLAIM).unlink()

@@ -19,10 +19,15 @@ _FAILED = (
 )
 
 Message = dict[str, Any]
+Process = asyncio.subprocess.Process
+_REST = 0.5  # s without a request, after which the next process is started
 
 
 class Worker:
     """A process that computes, one at a time; requests wait for each other.
+
+    Once it has answered, a second process is started, which has imported everything when the first
+    is ended: work goes on at once.
 
     Parameters
     ----------
@@ -34,30 +39,58 @@ class Worker:
 
     def __init__(self, folder: Path, log: Path | None = None) -> None:
         self._folder, self._log = folder, log
-        self._process: asyncio.subprocess.Process | None = None
+        self._process: Process | None = None
+        self._spare: Process | None = None
+        self._preparing: asyncio.Task[None] | None = None
         self._numbers = itertools.count(1)
         self._one_by_one = asyncio.Lock()
         self.starts = 0
 
     @property
     def pid(self) -> int | None:
-        """The process, if there is one."""
-        there = self._process is not None and self._process.returncode is None
-        return self._process.pid if there and self._process is not None else None
+        """The process that works, if there is one."""
+        return self._process.pid if self._process is not None and _runs(self._process) else None
 
-    async def start(self) -> asyncio.subprocess.Process:
-        """Start the process, if none runs; it imports while nobody waits."""
-        if self._process is None or self._process.returncode is not None:
-            log = os.devnull if self._log is None else self._log
-            with open(log, "ab") as errors:
-                self._process = await asyncio.create_subprocess_exec(
-                    sys.executable, "-m", "pkmcal.app.worker",
-                    stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE, stderr=errors,
-                    cwd=self._folder, limit=_LONGEST_LINE,
-                    env={**os.environ, "OPENBLAS_NUM_THREADS": "1", "PYTHONUTF8": "1"},
-                )  # fmt: skip
+    @property
+    def spare(self) -> int | None:
+        """The process that waits to take its place, if there is one."""
+        return self._spare.pid if self._spare is not None and _runs(self._spare) else None
+
+    async def start(self) -> Process:
+        """Have a process, the one that waits if there is one; it imports while nobody waits."""
+        if self._process is None or not _runs(self._process):
+            spare, self._spare = self._spare, None
+            there = spare is not None and _runs(spare)
+            self._process = spare if spare is not None and there else await self._launched()
             self.starts += 1
         return self._process
+
+    async def _launched(self) -> Process:
+        log = os.devnull if self._log is None else self._log
+        threads = {"OPENBLAS_NUM_THREADS": "1", **os.environ}  # as the command line has it
+        with open(log, "ab") as errors:
+            return await asyncio.create_subprocess_exec(
+                sys.executable, "-m", "pkmcal.app.worker",
+                stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE, stderr=errors,
+                cwd=self._folder, limit=_LONGEST_LINE, env={**threads, "PYTHONUTF8": "1"},
+            )  # fmt: skip
+
+    def _prepare(self) -> None:
+        """Start a process that waits, once nothing was asked for a moment."""
+        if self._preparing is not None:
+            self._preparing.cancel()
+        self._preparing = asyncio.ensure_future(self._prepared())
+
+    async def _prepared(self) -> None:
+        await asyncio.sleep(_REST)
+        if self._spare is None or not _runs(self._spare):
+            launching = asyncio.ensure_future(self._launched())
+            launching.add_done_callback(self._keep)
+            await asyncio.shield(launching)
+
+    def _keep(self, launched: asyncio.Future[Process]) -> None:
+        if not launched.cancelled() and launched.exception() is None:
+            self._spare = launched.result()
 
     async def run(self, operation: str, **asked: Any) -> AsyncIterator[Message]:
         """Yield the messages of one request; the last is a result or an error.
@@ -79,6 +112,8 @@ class Worker:
                         if message.pop("id") != number:
                             continue
                         done = "result" in message or "error" in message
+                        if done:
+                            self._prepare()
                         yield message
                         if done:
                             return
@@ -86,19 +121,32 @@ class Worker:
                 done = True
                 how = f" (signal {signal.Signals(-code).name})" if code < 0 else ""
                 await self.start()
+                self._prepare()
                 yield {"error": {"message": _FAILED.format(how=how), "crashed": True}}
             finally:
                 if not done:
                     await asyncio.shield(self.restart())
 
     async def restart(self) -> None:
-        """End what the process does, and start another."""
-        await self.stop()
+        """End what the process does, and have another."""
+        await _end(self._process)
         await self.start()
+        self._prepare()
 
     async def stop(self) -> None:
-        """End the process."""
-        if self._process is not None and self._process.returncode is None:
-            with contextlib.suppress(ProcessLookupError):
-                self._process.kill()
-            await self._process.wait()
+        """End all processes."""
+        if self._preparing is not None:
+            self._preparing.cancel()
+        await _end(self._process)
+        await _end(self._spare)
+
+
+def _runs(process: Process) -> bool:
+    return process.returncode is None
+
+
+async def _end(process: Process | None) -> None:
+    if process is not None and _runs(process):
+        with contextlib.suppress(ProcessLookupError):
+            process.kill()
+        await process.wait()

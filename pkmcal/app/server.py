@@ -11,7 +11,7 @@ import json
 import os
 import secrets
 import tempfile
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -23,17 +23,17 @@ from starlette.responses import FileResponse, JSONResponse, Response, StreamingR
 from starlette.routing import Route
 
 from pkmcal.app.commands import commands
-from pkmcal.app.folder import MOST_FILE, MOST_FOLDER, Folder
+from pkmcal.app.folder import MOST_FILE, MOST_FOLDER, UPLOAD, Folder
 from pkmcal.app.guard import Application, Guard
 from pkmcal.app.process import Message, Worker
 from pkmcal.exceptions import Error
 from pkmcal.jobs.stated import quoted
 from pkmcal.view import scripts
 
-OPERATIONS = ("machine", "plan", "look", "fit", "out", "report")
+OPERATIONS = ("take", "machine", "plan", "look", "fit", "out", "report")
 FOR_TESTS = ("wait", "crash")
-PAGES = ("app.css", "app.js", "frame.js", "transport.js", "picture.js", "machine.js", "plan.js",
-         "measure.js", "result.js", "out.js")  # fmt: skip
+PAGES = ("app.js", "frame.js", "transport.js", "picture.js", "machine.js", "plan.js",
+         "measure.js", "result.js", "numbers.js", "out.js")  # fmt: skip
 _KINDS = {".css": "text/css", ".js": "text/javascript", ".html": "text/html"}
 _MOST_STATE = 1_000_000  # bytes
 _SILENT = 15.0  # s, after which a stream of events says that it is there
@@ -50,7 +50,7 @@ class Server:
         door: contextlib.AbstractContextManager[None],
     ) -> None:
         self._folder, self._worker, self._operations, self._door = folder, worker, operations, door
-        self._listeners: set[asyncio.Queue[Message]] = set()
+        self._listeners: set[asyncio.Queue[Message | None]] = set()
         self._running: dict[str, asyncio.Event] = {}
 
     def application(self) -> Starlette:
@@ -69,7 +69,7 @@ class Server:
                 _static("/", "index.html"),
                 *(_static(f"/{name}", name) for name in PAGES),
                 _constant("/view.js", scripts.module("calibration").encode(), "text/javascript"),
-                _constant("/view.css", scripts.style().encode(), "text/css"),
+                _constant("/app.css", _style(), "text/css"),
                 Route("/wasm/{kind}", self.core),
                 Route("/api/state", self.state),
                 Route("/api/state", self.change, methods=["POST"]),
@@ -92,6 +92,10 @@ class Server:
 
     async def state(self, request: Request) -> Response:
         """The project, its files, and what each screen does as lines for a terminal."""
+        try:
+            self._folder.follow()
+        except (Error, OSError) as error:
+            return JSONResponse({**self._state(), "trouble": str(error)})
         return JSONResponse(self._state())
 
     def _state(self) -> Message:
@@ -132,6 +136,8 @@ class Server:
             return _refused(400, "no version in this request")
         try:
             return self._changed(request, self._folder.undo(version))
+        except Error as error:
+            return _refused(400, str(error))
         except OSError as error:
             return _refused(507, str(error))
 
@@ -151,7 +157,7 @@ class Server:
         if not announced.isdecimal() or int(announced) > room:
             return _refused(413, large)
         try:
-            place, part = tempfile.mkstemp(suffix=".part", prefix=".", dir=self._folder.path)
+            place, part = tempfile.mkstemp(UPLOAD[1], UPLOAD[0], self._folder.path)
         except OSError as error:
             return _refused(507, f"the file could not be kept: {error.strerror}")
         try:
@@ -162,14 +168,15 @@ class Server:
                     if count > room:
                         return _refused(413, large)
                     out.write(chunk)
-            name = self._folder.store(request.path_params["name"], Path(part))
+            name, former = self._folder.store(request.path_params["name"], Path(part))
         except ClientDisconnect:
             return _refused(400, "not complete")
         except OSError as error:
             return _refused(507, f"the file could not be kept: {error.strerror}")
         finally:
             Path(part).unlink(missing_ok=True)
-        return JSONResponse({"name": name})
+        said = None if former is None else f"{name} is new; the one before is kept as {former}"
+        return JSONResponse({"name": name, "said": said})
 
     async def run(self, request: Request) -> Response:
         """Stream what an operation of the worker says, line by line."""
@@ -185,6 +192,12 @@ class Server:
         return _streamed(self._lines(operation, asked))
 
     async def _lines(self, operation: str, asked: Message) -> AsyncIterator[bytes]:
+        try:
+            self._folder.follow()
+            self._folder.refuse_links(self._folder.project)
+        except (Error, OSError) as error:
+            yield _line({"error": {"message": str(error)}})
+            return
         job = secrets.token_urlsafe(6)
         stopped = self._running[job] = asyncio.Event()
         messages = self._worker.run(operation, state=self._folder.project.table(), given=asked)
@@ -221,17 +234,28 @@ class Server:
         return _streamed(self._events())
 
     async def _events(self) -> AsyncIterator[bytes]:
-        queue: asyncio.Queue[Message] = asyncio.Queue()
+        queue: asyncio.Queue[Message | None] = asyncio.Queue()
         self._listeners.add(queue)
         try:
             yield _line({"version": self._folder.version})
             while True:
                 try:
-                    yield _line(await asyncio.wait_for(queue.get(), _SILENT))
+                    told = await asyncio.wait_for(queue.get(), _SILENT)
                 except asyncio.TimeoutError:
                     yield b"\n"
+                    continue
+                if told is None:
+                    return
+                yield _line(told)
         finally:
             self._listeners.discard(queue)
+
+    def end(self) -> None:
+        """End what is streamed to pages: the server is about to end."""
+        for queue in self._listeners:
+            queue.put_nowait(None)
+        for stopped in self._running.values():
+            stopped.set()
 
     async def download(self, request: Request) -> Response:
         """A file of the folder, never shown by the browser itself."""
@@ -241,8 +265,9 @@ class Server:
         return FileResponse(found, media_type="application/octet-stream", filename=found.name)
 
     async def health(self, request: Request) -> Response:
-        """The worker's process and how often one was started."""
-        return JSONResponse({"worker": self._worker.pid, "starts": self._worker.starts})
+        """The processes that compute and wait, and how many have computed."""
+        worker = self._worker
+        return JSONResponse({"worker": worker.pid, "spare": worker.spare, "starts": worker.starts})
 
 
 @cache
@@ -259,11 +284,14 @@ def guarded(
     token: str,
     door: contextlib.AbstractContextManager[None],
     testing: bool = False,
-) -> Application:
-    """Return the whole application: routes behind the guard; `door` is open while it is there."""
+) -> tuple[Application, Callable[[], None]]:
+    """Return the whole application, routes behind the guard, and what ends its streams.
+
+    `door` is open while it is there.
+    """
     operations = OPERATIONS + FOR_TESTS * testing
     server = Server(folder, Worker(folder.path), operations, door)
-    return Guard(server.application(), port, token)
+    return Guard(server.application(), port, token), server.end
 
 
 class _TooLarge(Exception):
@@ -289,6 +317,12 @@ async def _body(request: Request) -> bytes:
 def _static(path: str, name: str) -> Route:
     content = files("pkmcal.app").joinpath(f"page/{name}").read_bytes()
     return _constant(path, content, _KINDS[Path(name).suffix])
+
+
+def _style() -> bytes:
+    """Return one style sheet: of the page, and of a machine in it."""
+    own = files("pkmcal.app").joinpath("page/app.css").read_bytes()
+    return scripts.style().encode() + b"\n" + own
 
 
 def _constant(path: str, content: bytes, kind: str) -> Route:

@@ -7,6 +7,7 @@ data. Words of results are those of the package.
 from __future__ import annotations
 
 import difflib
+import itertools
 import os
 import re
 import signal
@@ -14,17 +15,19 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import pkmcal as pk
-from pkmcal.app import telling
+from pkmcal.app import looking, taking, telling
 from pkmcal.app.commands import PLAN, REPORT, export, offered
 from pkmcal.app.folder import named
 from pkmcal.app.names import safe_name
+from pkmcal.app.sheet import sheet
 from pkmcal.checks.check_geometry import check_geometry
+from pkmcal.controllers.firmwares import Firmware
+from pkmcal.display import printable
 from pkmcal.exceptions import ArgumentError, Error
 from pkmcal.files.atomic import write_whole
-from pkmcal.files.reading import MOST_TABLE
 from pkmcal.geometry.controller import Controller
 from pkmcal.jobs import calibrating, exporting, importing, planning
 from pkmcal.jobs.calibration import Writing
@@ -34,11 +37,13 @@ from pkmcal.jobs.output import Output
 from pkmcal.jobs.project import Project
 from pkmcal.jobs.stated import quoted
 from pkmcal.jobs.written import Written, save_robot
+from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.view import page
 
 Table = dict[str, Any]
 Say = Callable[..., None]
-_LINES = 12  # of a file that are shown as they are
+_LINES, _AROUND = 12, 2  # of a file that are shown as they are, and around a mistake
+_LONGEST = 2000  # bytes of a line that are shown
 
 
 @dataclass
@@ -81,29 +86,67 @@ class Work:
             self.fitted = asked
         return self.found
 
+    def lines(self, project: Project) -> telling.Lines:
+        """Return where the rows of a calibration stand in its files."""
+        sources = self.read(project)
+        held = [] if sources.held is None else telling.lines_of(sources.held)
+        return telling.Lines(
+            [one for each in sources.measured for one in telling.lines_of(each)], held
+        )
+
+
+def take(work: Work, state: Table, given: Table, say: Say) -> Table:
+    """Take files, or a built-in machine, into the project, and say what became of it."""
+    project = Project.of_table(state)
+    if "builtin" in given:
+        taken = taking.with_machine(project, str(given["builtin"]))
+    else:
+        names = given.get("files")
+        if not isinstance(names, list):
+            raise ArgumentError("files: a list of names is needed")
+        taken = taking.taken(project, [_in_folder(name) for name in names])
+    return {"state": taken.project.table(), "said": list(taken.said)}
+
 
 def machine(work: Work, state: Table, given: Table, say: Say) -> Table:
     """Take in a firmware's configuration, check the machine, and show it."""
     project = Project.of_table(state)
-    notes: list[str] = []
+    found: Table = {"firmwares": list(get_args(Firmware)), "machines": _machines(project),
+                    "findings": [], "notes": [], "stored": []}  # fmt: skip
     inputs = Inputs()
-    if project.importing is not None:
-        say("reading the configuration")
-        printer = importing.run(project.importing, inputs)
-        importing.write(project.importing, printer, inputs, force=True)
-        notes = str(printer).splitlines()
-    robot = pk.load(inputs.robot(project.calibration.robot))
+    try:
+        if project.importing is not None:
+            say("reading the configuration")
+            printer = importing.run(project.importing, inputs)
+            paths = importing.write(project.importing, printer, inputs, force=True)
+            found["notes"] = str(printer).splitlines()
+            found["stored"] = [str(each) for each in paths[1:]]
+        robot = pk.load(inputs.robot(project.calibration.robot))
+    except (Error, OSError) as error:
+        return {**found, "error": told(error)}
     say("drawing the machine", 0.5)
-    found = check_geometry(robot)
-    stored = [] if project.importing is None else list(importing.tables(printer))
-    folder = Path(project.calibration.robot).parent
-    return {
-        "name": robot.name,
-        "findings": [telling.finding(each) for each in found.findings],
-        "notes": notes,
-        "stored": [str(folder / name) for name in stored],
-        "view": page.machine(robot),
-    }
+    findings = [telling.finding(each) for each in check_geometry(robot).findings]
+    return {**found, "name": robot.name, "findings": findings, "view": page.machine(robot)}
+
+
+def _machines(project: Project) -> list[str]:
+    """Files of the project that another machine may be made of."""
+    now = {project.calibration.robot, project.importing.file if project.importing else ""}
+    files = sorted(each.name for each in Path().iterdir() if each.is_file())
+    return [each for each in files if each not in now and taking.may_be_machine(each)]
+
+
+def _in_folder(name: object) -> str:
+    """The name of a file of the project.
+
+    Raises
+    ------
+    ValueError
+        No such file in the folder itself.
+    """
+    if not isinstance(name, str) or safe_name(name) != name or not Path(name).is_file():
+        raise ArgumentError(f"there is no file {printable(str(name))} in this project")
+    return name
 
 
 def plan(work: Work, state: Table, given: Table, say: Say) -> Table:
@@ -117,7 +160,8 @@ def plan(work: Work, state: Table, given: Table, say: Say) -> Table:
         planning.write(made, draft, inputs.comment())
     shown = page.machine(made.robot, cloud=False)
     shown["places"] = page.places("planned poses", made.robot, made.poses)
-    return {"text": str(made), "files": [str(each) for each in output.paths], "view": shown}
+    return {"text": str(made), "files": [str(each) for each in output.paths], "view": shown,
+            "sheet": sheet(made)}  # fmt: skip
 
 
 def look(work: Work, state: Table, given: Table, say: Say) -> Table:
@@ -125,19 +169,30 @@ def look(work: Work, state: Table, given: Table, say: Say) -> Table:
     project = Project.of_table(state)
     job = project.calibration
     names = [*job.files, *filter(None, [job.reading.controller])]
-    found: Table = {"files": {name: _head(name) for name in names}}
+    inputs = Inputs()
+    machine = as_machine(pk.load(inputs.robot(job.robot)))
+    found: Table = {
+        "files": {name: _lines(name) for name in names},
+        "meanings": looking.meanings(machine),
+        "units": looking.units(),
+        "joins": looking.joins(job, machine, inputs),
+    }
     try:
         sources = work.read(project)
     except (Error, OSError) as error:
-        return {**found, "error": told(error)}
+        mistake = told(error)
+        for name in names:
+            if Path(name).name == mistake.get("file"):
+                found["files"][name] = _lines(name, mistake["line"])
+        return {**found, "columns": looking.headings(names), "error": mistake}
     measured = sources.measured
     return {
         **found,
+        "columns": looking.columns(measured),
         "notes": list(
             dict.fromkeys([*work.notes, *(note for each in measured for note in each.notes)])
         ),
         "text": [str(each) for each in measured],
-        "rows": sum(map(len, measured)),
     }
 
 
@@ -149,7 +204,7 @@ def fit(work: Work, state: Table, given: Table, say: Say) -> Table:
     say("identifying", 0.2)
     found = work.fit(project)
     say("judging", 0.7)
-    return telling.calibration(found, project.calibration, _lines(work))
+    return telling.calibration(found, project.calibration, work.lines(project))
 
 
 def out(work: Work, state: Table, given: Table, say: Say) -> Table:
@@ -160,9 +215,12 @@ def out(work: Work, state: Table, given: Table, say: Say) -> Table:
     with Output(Path(REPORT), ["robot.toml"], work.inputs, True).draft() as draft:
         save_robot(found, draft / "robot.toml", work.inputs, project.calibration.robot)
     files = [_file(f"{REPORT}/robot.toml", "the calibrated machine")]
-    exports = [export(target) for target in project.targets]
     robot = sources.robot
+    exports = [export(target) for target in project.targets]
+    asked = dict(zip((job.out for job in exports), project.targets, strict=True))
+    own = None
     if isinstance(robot, pk.Robot) and robot.model.controller:
+        own = robot.model.controller.firmware
         exports.insert(0, own_export(robot.model.controller, f"{REPORT}/robot.toml"))
     inputs = {each.resolve() for each in work.inputs.paths}
     changed: list[str] = []
@@ -173,17 +231,20 @@ def out(work: Work, state: Table, given: Table, say: Say) -> Table:
             if Path(name).resolve() in inputs:
                 raise ArgumentError(f"{name} is an input: give your file another name")
             said = str(exporting.run(job, Inputs(), force=True))
-            files.append(_file("" if Path(name).is_dir() else name, f"{name}: {said}"))
+            file = _file("" if Path(name).is_dir() else name, f"{name}: {said}")
+            files.append({**file, "target": asked.get(job.out)})
         except Error as error:
-            files.append(_file("", str(error)))
+            files.append({**_file("", f"{job.target}: {error}"), "target": asked.get(job.out)})
             continue
         if job.config is not None:
             old, new = (Path(each).read_text("utf-8", "replace").splitlines()
                         for each in (job.config, name))  # fmt: skip
             changed += difflib.unified_diff(old, new, job.config, name, n=1, lineterm="")
-    lines = [quoted(job.argv()) for job in exports]
-    others = offered(isinstance(robot, pk.SerialArm))
-    return {"files": files, "changed": changed, "commands": lines, "targets": others}
+    there = (*project.targets, own)
+    others = [(each.name, each.label) for each in offered(robot) if each.name not in there]
+    return {"files": files, "changed": changed, "targets": others,
+            "certificate": telling.stated(Path("certificate.toml")),
+            "commands": [quoted(job.argv()) for job in exports]}  # fmt: skip
 
 
 def report(work: Work, state: Table, given: Table, say: Say) -> Table:
@@ -223,7 +284,7 @@ def crash(work: Work, state: Table, given: Table, say: Say) -> Table:
 
 
 OPERATIONS: dict[str, Callable[[Work, Table, Table, Say], Table]] = {
-    each.__name__: each for each in (machine, plan, look, fit, out, report, wait, crash)
+    each.__name__: each for each in (take, machine, plan, look, fit, out, report, wait, crash)
 }
 
 
@@ -242,23 +303,18 @@ def own_export(controller: Controller, robot: str) -> Exporting:
     return Exporting(robot, controller.firmware, safe_name(controller.new), config=config)
 
 
-def _head(name: str) -> list[str]:
-    """Return the first lines of a file, as text whatever is in it."""
+def _lines(name: str, at: int = 0) -> list[tuple[int, str]]:
+    """Return a file's first lines with their numbers, and those around one, whatever is in it."""
+    first = range(1, _LINES + 1)
+    shown = {*first, *range(at - _AROUND, at + _AROUND + 1)} if at > _LINES else {*first}
+    found = list[tuple[int, str]]()
     with open(name, "rb") as file:
-        begin = file.read(min(MOST_TABLE, 8192))
-    return begin.decode("utf-8", "replace").splitlines()[:_LINES]
+        for number, line in enumerate(itertools.islice(file, max(shown)), 1):
+            if number in shown:
+                text = line[:_LONGEST].decode("utf-8", "replace").rstrip("\r\n")
+                found.append((number, text))
+    return found
 
 
 def _file(name: str, *words: str) -> Table:
     return {"file": name, "what": " ".join(words)}
-
-
-def _lines(work: Work) -> list[tuple[str, int]]:
-    """Return the file and line of each measured row, in the order of the rows."""
-    assert work.sources is not None
-    found: list[tuple[str, int]] = []
-    for each in work.sources.measured:
-        lines = getattr(each, "lines", None)
-        numbers = [-1] * len(each) if lines is None else [int(one) for one in lines]
-        found += [(Path(str(each.file)).name, one) for one in numbers]
-    return found

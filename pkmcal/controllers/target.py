@@ -46,6 +46,8 @@ class Target:
         Name of the file that the window writes; by default it contains the name.
     folder : bool
         Whether a folder is written.
+    tried : bool
+        Whether it holds few kinds of machines, so that the window tries it before it offers it.
     said : str
         Words before a loss where it is not that of what was written.
 
@@ -67,6 +69,7 @@ class Target:
     label: str = ""
     file: str = ""
     folder: bool = False
+    tried: bool = False
     said: str = ""
 
     def __post_init__(self) -> None:

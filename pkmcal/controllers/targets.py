@@ -28,26 +28,36 @@ _PACKAGE = (
         "klipper",
         _HERE + "klipper:klipper",
         "the numbers of a linear or rotary delta for Klipper or Kalico",
+        label="Klipper, Kalico",
+        tried=True,
     ),
     Target(
         "reprap",
         _HERE + "delta_gcode:reprap",
         "M665 and M666 of a linear delta, M669 and M666 of a rotary one, for RepRapFirmware",
+        label="RepRapFirmware",
+        tried=True,
     ),
     Target(
         "marlin",
         _HERE + "delta_gcode:marlin",
         "M665, M666 and M851 of a linear delta, for Marlin",
+        label="Marlin",
+        tried=True,
     ),
     Target(
         "hangprinter",
         _HERE + "hangprinter:hangprinter",
         "M669 and M666 of a Hangprinter, for RepRapFirmware",
+        label="Hangprinter",
+        tried=True,
     ),
     Target(
         "maslow",
         _HERE + "maslow:maslow",
         "the anchors of a maslow.yaml, for FluidNC",
+        label="Maslow",
+        tried=True,
     ),
     Target(
         "linuxcnc",
@@ -83,12 +93,14 @@ _PACKAGE = (
         _HERE + "arm_dh:modified_dh",
         "that table in the modified convention",
         takes="arm",
+        label="modified Denavit–Hartenberg table",
     ),
     Target(
         "ur",
         _HERE + "arm_dh:universal_robots",
         "the lists of a calibration.conf of Universal Robots",
         takes="arm",
+        label="Universal Robots",
     ),
 )
 _OWN = {each.name: each for each in _PACKAGE}

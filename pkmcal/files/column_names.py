@@ -102,6 +102,7 @@ _NAMES = {letter: letter for angles in EULER[1:] for letter in angles} | {
     other: name for name, others in _SYNONYMS.items() for other in (name, *others.split("|"))
 }
 SYNONYMS = tuple(_NAMES)
+KNOWN_NAMES = tuple(_SYNONYMS)
 _PARTING = re.compile(r"[\s_\-.:/]+")
 _DRIVEN = re.compile(
     r"(?P<stem>(?:(?:actual|measured|commanded|command|cmd|target|nominal|set|desired|feedback|fbk)"

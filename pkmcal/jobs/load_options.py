@@ -38,8 +38,8 @@ def carrying(
         return robot.carrying(load)
     if robot.laws is None or not robot.laws.yielding:
         raise ArgumentError(
-            f"robot: {robot.name} is an arm of which nothing yields to a payload: its file states no"
-            " stiffness of a joint"
+            f"robot: {robot.name} is an arm of which nothing yields to a payload: its file states"
+            " no stiffness of a joint"
         )
     return robot.under(load)
 

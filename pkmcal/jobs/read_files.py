@@ -22,7 +22,7 @@ from pkmcal.measurements.measurements import Measurements
 from pkmcal.readings.boards import Board
 from pkmcal.readings.camera import Camera, Found, Mount
 
-_KEYS = ("header", "ignore", "rename", "units", "rotation")
+COLUMNS = ("header", "ignore", "rename", "units", "rotation")  # keys of a file of --columns
 
 
 def read_file(
@@ -145,7 +145,7 @@ def _columns(path: str, inputs: Inputs) -> dict[str, Any]:
         No TOML, an unknown key, a value that is no text.
     """
     table = Table((source := Source(inputs.file(path).content(MOST_ROBOT), path)).data, source)
-    table.only(_KEYS, "columns")
+    table.only(COLUMNS, "columns")
     found: dict[str, Any] = {
         key: table.texts(key) for key in ("header", "ignore", "units") if key in table
     }

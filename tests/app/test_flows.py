@@ -35,6 +35,18 @@ def fits(page: Any, count: int) -> None:
     page.locator(f"main[data-fits='{count}']").wait_for()
 
 
+def click_arrow(page: Any, key: str) -> None:
+    """Click the arrow of a row in the picture, where it begins."""
+    page.evaluate("workbench.picture.scrollIntoView()")
+    at = page.evaluate(
+        "(() => { const { scene, calibration } = workbench.picture.machine,"
+        f" p = calibration.points.find(one => one.key === '{key}'),"
+        " [x, y] = scene.seen(scene.eye, p.at), r = scene.canvas.getBoundingClientRect();"
+        " return [r.x + x, r.y + y] })()"
+    )
+    page.mouse.click(*at)
+
+
 def commands(page: Any, step: str) -> list[list[str]]:
     page.get_by_role("button", name=step, exact=True).click()
     page.locator(f"main.{page.evaluate('workbench.step')}").wait_for()
@@ -124,27 +136,27 @@ def test_a_metrologist_leaves_bad_rows_out_and_gets_what_the_command_says(
         fits(page, 1)
         assert page.locator("tr.odd").count() == 2
         before = (served.folder / "project.toml").read_bytes()
-        for count, row in ((2, 17), (3, 52)):
-            look = page.evaluate("workbench.picture.machine.scene.turn")
-            page.get_by_role("checkbox", name=f"use row {row}", exact=True).click()
-            fits(page, count)
-            assert page.evaluate("workbench.picture.machine.scene.turn") == look
+        bad = page.get_by_role("checkbox", name="use tracker.csv line 19", exact=True)
+        look = page.evaluate("workbench.picture.machine.scene.turn")
+        bad.focus()
+        page.keyboard.press("Space")  # in the row
+        fits(page, 2)
+        assert bad.evaluate("box => box === document.activeElement") and not bad.is_checked()
+        click_arrow(page, "52")  # in the picture
+        assert page.locator("tr.named").get_attribute("id") == "row 52"
+        page.locator(".picked").get_by_role("checkbox").click()
+        fits(page, 3)
+        assert page.evaluate("workbench.picture.machine.scene.turn") == look
         assert page.locator("tr.odd").count() == 0
-        left = page.locator("tr.out td:last-child").all_inner_texts()  # how far off they would be
-        assert [round(float(each.split()[0])) for each in left] == [3, 4]
-        page.get_by_role("button", name="show row 3", exact=True).click()
-        assert page.evaluate("workbench.picture.machine.calibration.named.row") == 3
-        at = page.evaluate(
-            "(() => { const { scene, calibration } = workbench.picture.machine,"
-            " p = calibration.points[40],"
-            " [x, y] = scene.seen(scene.eye, p.at), r = scene.canvas.getBoundingClientRect();"
-            " return [r.x + x, r.y + y] })()"
-        )
-        page.mouse.click(*at)
-        assert page.locator("tr.named").count() == 1
+        left = page.locator("tr.out td:nth-child(4)").all_inner_texts()  # how far off they would be
+        assert sorted(round(float(each)) for each in left) == [3, 4]
+        assert page.locator("tr.out td:last-child").all_inner_texts() == ["left out"] * 2
+        page.get_by_role("button", name="show tracker.csv line 5", exact=True).click()
+        assert page.evaluate("workbench.picture.machine.calibration.named.key") == "3"
         page.get_by_label("hold out").select_option("0.2")
         fits(page, 4)
         assert "held-out" in page.locator(".verdict .state").inner_text()
+        assert page.locator("tr.out td:last-child", has_text="held out").count() == 18
         page.get_by_role("button", name="Numbers").click()
         page.get_by_label("find another number, too").select_option("gain1")
         fits(page, 5)
@@ -152,9 +164,9 @@ def test_a_metrologist_leaves_bad_rows_out_and_gets_what_the_command_says(
         shown = page.locator("pre", has_text="rms before").inner_text()
         (argv,) = commands(page, "4 Result")
         for _ in range(4):
+            fitted = int(page.locator("main").get_attribute("data-fits") or 0)
             page.get_by_role("button", name="Undo").click()
-            page.wait_for_timeout(300)
-            page.locator("main[data-fits]").wait_for()
+            fits(page, fitted + 1)
         assert (served.folder / "project.toml").read_bytes() == before
     by_hand = tmp_path / "by hand"
     shutil.copytree(tracked, by_hand)

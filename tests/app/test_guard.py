@@ -28,7 +28,7 @@ PAGES = (
     "/transport.js",
     "/app.css",
     "/view.js",
-    "/view.css",
+    "/numbers.js",
     "/wasm/limbs",
 )
 
@@ -280,3 +280,14 @@ def test_whatever_is_asked_the_server_answers_and_keeps_to_its_folder(
     if way.rstrip("/").endswith(("/events", "/run/fit", "/run/machine")):
         return  # streams that work
     assert ask(served, method, way, body)[0] < 500
+
+
+@pytest.mark.parametrize(
+    "given",
+    [{}, {"files": 3}, {"files": ["../x"]}, {"files": ["/etc/passwd"]}, {"files": [None]},
+     {"files": ["project.toml\0"]}, {"files": [".open-pkmcal.html"]}, {"files": [{}]}],
+)  # fmt: skip
+def test_only_files_of_the_folder_are_taken(served: browser.Served, given: object) -> None:
+    lines = ask(served, "POST", "/api/run/take", json.dumps(given).encode())[2].splitlines()
+    error = json.loads(lines[-1])["error"]
+    assert "fault" not in error and "crashed" not in error

@@ -69,10 +69,18 @@ def test_names_of_ordinary_files_stay() -> None:
 
 def test_a_file_of_the_users_never_takes_the_place_of_the_projects(tmp_path: Path) -> None:
     folder = Folder(tmp_path / "project")
-    for name in ("project.toml", "robot.toml", "new.cfg", "machine.h", "plan", "x.part"):
+    for name in (
+        "project.toml",
+        "PROJECT.TOML",
+        "robot.toml",
+        "new.cfg",
+        "machine.h",
+        "plan",
+        "x.part",
+    ):
         part = folder.path / ".sent"
         part.write_text("mine")
-        assert folder.store(name, part) == f"my_{name}"
+        assert folder.store(name, part) == (f"my_{name}", None)
 
 
 @pytest.mark.parametrize(

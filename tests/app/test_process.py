@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import http.client
 import json
+import subprocess
+import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -55,20 +57,32 @@ def test_a_process_that_dies_is_said_and_replaced(tmp_path: Path) -> None:
     assert not list(served.folder.glob(".*"))
 
 
+def stopped(served: browser.Served) -> float:
+    """Stop work that runs; the seconds until it was answered."""
+    connection = http.client.HTTPConnection("127.0.0.1", served.port, timeout=30)
+    headers = {"x-pkmcal-token": served.token}
+    connection.request("POST", "/api/run/wait", b"{}", headers)
+    answer = connection.getresponse()
+    job = json.loads(answer.readline())["job"]
+    assert "progress" in json.loads(answer.readline())
+    begin = time.monotonic()
+    assert json.loads(ask(served, "POST", f"/api/cancel/{job}")[2]) == {"stopped": True}
+    *_, last = answer.read().splitlines()
+    took = time.monotonic() - begin
+    connection.close()
+    assert json.loads(last)["error"] == {"message": "stopped", "stopped": True}
+    return took
+
+
 def test_stop_answers_at_once_and_the_next_work_goes_on(tmp_path: Path) -> None:
     with browser.served(tmp_path / "project") as served:
         take_hexapod(served)
-        connection = http.client.HTTPConnection("127.0.0.1", served.port, timeout=30)
-        headers = {"x-pkmcal-token": served.token}
-        connection.request("POST", "/api/run/wait", b"{}", headers)
-        answer = connection.getresponse()
-        job = json.loads(answer.readline())["job"]
-        assert "progress" in json.loads(answer.readline())
-        assert json.loads(ask(served, "POST", f"/api/cancel/{job}")[2]) == {"stopped": True}
-        *_, last = answer.read().splitlines()
-        connection.close()
-        assert json.loads(last)["error"] == {"message": "stopped", "stopped": True}
+        lines(served, "machine")
+        spare_of(served)
+        time.sleep(2)  # it imports
+        took, begin = stopped(served), time.monotonic()
         assert "result" in lines(served, "machine")[-1]
+        print(f"stopped in {1000 * took:.0f} ms, works again in {time.monotonic() - begin:.2f} s")
 
 
 def test_a_tab_that_is_closed_ends_its_work(tmp_path: Path) -> None:
@@ -95,15 +109,83 @@ def test_an_error_of_the_users_is_in_words_with_file_and_line(tmp_path: Path) ->
         assert ask(served, "POST", "/api/state", body)[0] == 200
         found = lines(served, "look")[-1]["result"]
         assert "broken.csv" in found["error"]["message"]
-        assert found["files"]["broken.csv"][0] == "q1 [mm],x [mm]"
+        assert found["files"]["broken.csv"][0] == [1, "q1 [mm],x [mm]"]
         assert "broken.csv" in lines(served, "fit")[-1]["error"]["message"]
+
+
+def spare_of(served: browser.Served) -> int:
+    """The process that waits, as soon as there is one."""
+    end = time.monotonic() + 20
+    while time.monotonic() < end:
+        if spare := health(served)["spare"]:
+            return spare
+        time.sleep(0.05)
+    raise AssertionError("no process was started to wait")
 
 
 def test_a_server_that_is_ended_ends_what_it_started(tmp_path: Path) -> None:
     with browser.served(tmp_path / "project") as served:
-        worker = health(served)["worker"]
+        take_hexapod(served)
+        lines(served, "machine")
+        worker, spare = health(served)["worker"], spare_of(served)
         served.process.kill()  # not even asked
-        assert gone(worker)
+        assert gone(worker) and gone(spare)
+
+
+def test_a_process_that_waits_takes_the_place_of_one_that_is_ended(tmp_path: Path) -> None:
+    with browser.served(tmp_path / "project") as served:
+        take_hexapod(served)
+        lines(served, "machine")
+        spare = spare_of(served)
+        lines(served, "crash")
+        assert health(served)["worker"] == spare
+        assert spare_of(served) != spare
+        assert "result" in lines(served, "machine")[-1]
+
+
+@pytest.mark.slow
+def test_after_twenty_stops_and_crashes_nothing_is_left(tmp_path: Path) -> None:
+    seen = set[int]()
+    with browser.served(tmp_path / "project") as served:
+        take_hexapod(served)
+        for count in range(20):
+            if count % 4:
+                lines(served, "crash")
+            else:
+                stopped(served)
+            seen.add(health(served)["worker"])
+        assert "result" in lines(served, "machine")[-1]
+        seen |= {health(served)["worker"], spare_of(served)}
+        assert not list(served.folder.glob("*.part")) and not list(served.folder.glob(".*.part"))
+    assert all(map(gone, seen))
+
+
+def test_a_folder_has_one_server(tmp_path: Path) -> None:
+    with browser.served(tmp_path / "project") as served:
+        code = (
+            "import sys, pathlib; from pkmcal.app.launch import launch;"
+            "launch(pathlib.Path(sys.argv[1]), print, browser=False)"
+        )
+        done = subprocess.run(
+            [sys.executable, "-c", code, str(served.folder)],
+            capture_output=True, text=True, check=False, timeout=60,
+        )  # fmt: skip
+        assert done.returncode and "its window is open already" in done.stderr
+        assert state(served)["version"] == 1
+        served.process.kill()  # what it held is free
+        served.process.wait()
+    with browser.served(served.folder) as again:
+        assert state(again)["version"] == 1
+
+
+def test_what_a_killed_upload_left_is_removed(tmp_path: Path) -> None:
+    folder = tmp_path / "project"
+    folder.mkdir()
+    for name in (".upload-abc.part", "mine.part"):
+        (folder / name).write_text("half")
+    with browser.served(folder) as served:
+        state(served)
+        assert not (folder / ".upload-abc.part").exists() and (folder / "mine.part").exists()
 
 
 def test_the_server_itself_computes_nothing(tmp_path: Path) -> None:

@@ -131,8 +131,8 @@ def test_a_registered_target_is_known_to_verb_and_window(tmp_path: Path) -> None
     done = run("export", "hexapod", "--as", "names", "--out", tmp_path / "a.txt", "--project")
     assert done.exit_code == 0, done.output
     assert (tmp_path / "a.txt").read_text().endswith("gain6 projected")
-    assert ("names", "Names") in commands.offered(arm=False)
-    assert ("names", "Names") not in commands.offered(arm=True)
+    assert own in commands.offered(pk.load("hexapod"))
+    assert own not in commands.offered(pk.SerialArm.from_dh(a=[300, 200], alpha=0, d=0))
     assert commands.export("names").out == "names.txt"
     assert run("export", "hexapod", "--as", "nams", "--out", tmp_path / "b").exit_code == 2
 

@@ -25,6 +25,7 @@ export function button(parent, text, pressed, settings = {}) {
 }
 
 export function field(parent, text, control) {
+  control.dataset.key ??= text
   made('label', parent, { className: 'field' }, made('span', null, { text }), control)
   return control
 }
@@ -60,16 +61,19 @@ export async function attempt(what) {
 }
 
 // Work that may take long: words and a bar after a quarter of a second, and a button that ends it.
+// Of one operation only what was asked last goes on.
 export async function work(operation, words, given) {
-  const bar = $('busy'), began = performance.now()
-  let job = null
+  const bar = $('busy'), began = performance.now(), own = {}
+  if (running[operation]?.job) server.cancel(running[operation].job)
+  running[operation] = own
   bar.firstElementChild.textContent = words
   bar.querySelector('progress').removeAttribute('value')
   const shown = setTimeout(() => { bar.hidden = false }, 250)
-  bar.querySelector('button').onclick = () => job && server.cancel(job)
+  bar.querySelector('button').onclick = () => own.job && server.cancel(own.job)
   try {
     for await (const message of await server.run(operation, given)) {
-      job ??= message.job
+      own.job ??= message.job
+      if (own.job && running[operation] !== own) server.cancel(own.job)
       if (message.progress) bar.firstElementChild.textContent = `${words}: ${message.progress}`
       if (typeof message.share === 'number') bar.querySelector('progress').value = message.share
       if (message.error) throw Object.assign(Error(message.error.message), message.error)
@@ -81,8 +85,30 @@ export async function work(operation, words, given) {
     throw Error('the server ended')
   } finally {
     clearTimeout(shown)
-    bar.hidden = true
+    if (running[operation] === own) {
+      delete running[operation]
+      bar.hidden = !Object.keys(running).length
+    }
   }
+}
+
+const running = {}
+const keyOf = one => `${one.tagName} ${one.id || one.dataset.key || one.getAttribute('aria-label') || one.textContent}`
+
+// Draw again what stands in an element: who is in one of its fields or has scrolled stays there.
+export function again(parent, draw) {
+  const at = parent.contains(document.activeElement) ? document.activeElement : null
+  const of = key => [...parent.querySelectorAll('button, input, select, summary, [tabindex]')].filter(one => keyOf(one) === key)
+  const key = at && keyOf(at), place = at && of(key).indexOf(at)
+  const typed = at?.tagName === 'INPUT' && at.type !== 'checkbox' && at.value !== at.defaultValue ? at.value : null
+  const tops = [...parent.querySelectorAll('.wide')].map(one => one.scrollTop)
+  parent.replaceChildren()
+  draw()
+  parent.querySelectorAll('.wide').forEach((one, k) => { one.scrollTop = tops[k] ?? 0 })
+  if (!at) return
+  const now = of(key)[place] ?? of(key)[0] ?? parent.querySelector('button, input, select') ?? $('main')
+  if (typed !== null && keyOf(now) === key) now.value = typed
+  now.focus({ preventScroll: true })
 }
 
 let last = Promise.resolve()
@@ -103,28 +129,33 @@ async function changing(edit) {
 }
 
 export async function undo() {
-  if (await taken(await server.undo(app.project.version))) await go(app.step)
+  said([])
+  if (await taken(await server.undo(app.project.version))) await refresh()
 }
 
 async function taken(answer) {
   app.project = answer
   frame()
   if (!answer.late) return true
-  await go(app.step)
+  await refresh()
   trouble('Another tab changed the project. This one now shows it as it is: do it again if you still want to.')
   return false
 }
 
-const ready = { machine: () => true, plan: p => p.commands.plan.length, measure: p => p.commands.machine.length, result: p => p.commands.result.length, out: p => p.commands.result.length }
+const ready = {
+  machine: () => true, plan: p => p.commands.plan.length, measure: p => p.commands.machine.length,
+  result: p => p.commands.result.length, out: p => p.commands.result.length,
+}
 
 export function frame() {
   const { project } = app
-  $('steps').replaceChildren(...STEPS.map(([step, text], k) => {
-    const one = button(null, `${k + 1} ${text}`, () => go(step))
+  if (!$('steps').children.length) STEPS.forEach(([step, text], k) => button(made('li', $('steps')), `${k + 1} ${text}`, () => go(step)))
+  STEPS.forEach(([step], k) => {
+    const one = $('steps').children[k].firstElementChild
     if (step === app.step) one.setAttribute('aria-current', 'step')
+    else one.removeAttribute('aria-current')
     one.disabled = !ready[step](project)
-    return made('li', null, {}, one)
-  }))
+  })
   $('undo').hidden = !project.undo
   $('undo').onclick = () => attempt(undo)
   const lines = project.commands[app.step] ?? []
@@ -135,7 +166,9 @@ export function frame() {
 
 export async function go(step, focus = true) {
   if (!ready[step](app.project)) step = 'machine' // as after undo
+  if (step !== app.step) said([])
   app.step = step
+  app.refresh = null
   app.picture?.machine?.dispose?.()
   app.picture = null
   frame()
@@ -144,22 +177,21 @@ export async function go(step, focus = true) {
   main.replaceChildren(screen)
   main.className = step
   if (focus) main.focus({ preventScroll: true })
-  await attempt(() => app.screens[step](screen))
+  await attempt(async () => {
+    const show = await app.screens[step](screen)
+    if (app.step === step && screen.isConnected) app.refresh = show
+  })
 }
 
-// A place to drop files, and a button for those who do not drag.
-export function dropping(parent, words, taken) {
-  const zone = made('div', parent, { className: 'drop' })
-  const input = made('input', zone, { type: 'file', id: `files-of-${app.step}`, multiple: true })
-  made('label', zone, { for: input.id, className: 'button first', text: 'Choose files' })
-  made('p', zone, { text: words })
-  const take = files => attempt(async () => {
-    const names = []
-    for (const file of files) names.push(await server.send(file))
-    await taken(names)
-  })
-  input.onchange = () => take([...input.files])
-  zone.ondragover = event => { event.preventDefault(); zone.classList.add('over') }
-  zone.ondragleave = () => zone.classList.remove('over')
-  zone.ondrop = event => { event.preventDefault(); zone.classList.remove('over'); take([...event.dataTransfer.files]) }
+// Show the project as it is now; the screen stays, unless it has nothing to do any more.
+export async function refresh() {
+  frame()
+  if (app.refresh && ready[app.step](app.project)) await attempt(app.refresh)
+  else await go(app.step, false)
+}
+
+// What is said of files that were given.
+export function said(lines) {
+  $('said').replaceChildren(...lines.filter(Boolean).map(text => made('p', null, { text })))
+  $('said').hidden = !$('said').children.length
 }

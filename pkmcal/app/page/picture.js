@@ -4,7 +4,7 @@ import { app, made } from './frame.js'
 
 const cores = {}
 
-// Draw a machine; where one was drawn before, the look at it and what is shown stay.
+// Draw a machine; where it was drawn before, the look at it and what is shown stay.
 export async function draw(parent, data, picked) {
   const old = app.picture?.isConnected && app.picture.parentElement === parent ? app.picture : null
   const { start } = await import('/view.js')
@@ -13,43 +13,45 @@ export async function draw(parent, data, picked) {
   if (old) old.replaceWith(root)
   else parent.replaceChildren(root)
   app.picture = root
+  const same = old?.machine?.name === data.name
   await start(root, { ...data, wasm: cores[data.kind] })
   const { scene, calibration } = root.machine
+  root.machine.name = data.name
   root.machine.dispose = () => {
     scene.dark.removeEventListener('change', scene.redraw)
     scene.observer.disconnect()
   }
   if (calibration?.points.length) {
-    if (old?.machine.calibration?.points.length) {
+    if (same && old.machine.calibration?.points.length) {
       const { when, times } = old.machine.calibration
       Object.assign(calibration, { when, times })
     } else {
-      const long = calibration.points.map(p => Math.hypot(...p.after)).sort((a, b) => a - b)
+      const long = calibration.fitted.map(p => Math.hypot(...p.after)).sort((a, b) => a - b)
       calibration.when = 'after' // what is left, not what was
       calibration.times = calibration.rounded(Math.min(1e6, (0.09 * data.size) / (long[Math.floor(0.9 * long.length)] || 1)))
     }
     calibration.update(false)
   }
-  if (old) {
+  if (same) {
     const { turn, tilt, zoom, room, centre, radius, floor, points, fitted, tilted } = old.machine.scene
     Object.assign(scene, { turn, tilt, zoom, room, centre, radius, floor, points, fitted, tilted })
-    old.machine.dispose()
   }
+  old?.machine?.dispose()
   root.machine.changed(false)
   const pointed = scene.pointed
   if (pointed) {
     scene.pointed = (x, y, pressed) => {
       pointed(x, y)
-      if (pressed && calibration.named) picked?.(calibration.named.row)
+      if (pressed && calibration.named) picked?.(calibration.named.key)
     }
   }
   return root
 }
 
 // Name the residual of a row in the picture, as if it were pointed at.
-export function selected(row) {
+export function selected(key) {
   const calibration = app.picture?.machine?.calibration
   if (!calibration) return
-  calibration.named = calibration.points.find(p => p.row === row) ?? null
+  calibration.named = calibration.points.find(p => p.key === key) ?? null
   calibration.redraw()
 }

@@ -1,35 +1,72 @@
 // Where to measure, so that a calibration knows best where the machine goes.
-import { app, attempt, button, change, choice, field, made, work } from './frame.js'
+import { again, app, attempt, button, change, choice, field, made, work } from './frame.js'
 import { draw } from './picture.js'
 import { save } from './transport.js'
 
 const KINDS = [['probe', 'its own probe, on the bed'], ['position', 'positions'], ['pose', 'poses'], ['height', 'heights'], ['distance', 'distances']]
+const REST = 300 // ms without a change, after which the plan is made again
+const FIELDS = [ // key of the project's table, words, what stands there without
+  ['count', 'poses', '20'], ['accuracy', 'or as many as reach, mm', ''], ['noise', 'its noise, mm', '0.02'],
+  ['actuator-noise', 'noise of the actuators, mm or rad', '0'], ['within', 'within, such as z=0:300', ''],
+]
+const NUMBERS = ['count', 'accuracy', 'actuator-noise']
 
 export async function plan(main) {
   made('h1', main, { text: 'Where to measure' })
-  const now = app.project.state.plan ?? {}, form = made('form', main, { className: 'settings' })
-  const number = (value, settings) => made('input', null, { type: 'number', step: 'any', min: 0, value: value ?? '', ...settings })
-  const kind = choice(form, 'what the instrument reads', KINDS, now.kind ?? (app.project.state.import ? 'probe' : 'position'), () => {})
-  const count = field(form, 'poses', number(now.count ?? 20, { step: 1, min: 1 }))
-  const noise = field(form, 'its noise, mm', number(now.noise ?? '', { placeholder: '0.02' }))
-  const accuracy = field(form, 'or as many as reach, mm', number(now.accuracy))
-  const answer = made('section', main, { 'aria-live': 'polite' })
+  const form = made('form', main, { className: 'settings' }), answer = made('section', main, { 'aria-live': 'polite' })
+  const now = () => app.project.state.plan ?? {}
+  const kinds = KINDS.some(([key]) => key === now().kind) || !now().kind ? KINDS : [...KINDS, [now().kind, now().kind]]
+  let rest = 0
+  const soon = () => { clearTimeout(rest); rest = setTimeout(() => attempt(choose), REST) }
+  const kind = choice(form, 'what the instrument reads', kinds, now().kind ?? (app.project.state.import ? 'probe' : 'position'), soon)
+  const fields = FIELDS.map(([key, words, placeholder]) => {
+    const input = made('input', null, { inputmode: key === 'within' ? 'text' : 'decimal', size: 10, placeholder, oninput: soon })
+    return [key, field(form, words, input)]
+  })
+  const fill = () => fields.forEach(([key, input]) => { if (input !== document.activeElement) input.value = [now()[key] ?? ''].flat().join(',') })
+  fill()
   made('button', form, { className: 'first', text: 'Choose poses' })
   form.onsubmit = event => {
     event.preventDefault()
+    clearTimeout(rest)
     attempt(choose)
   }
+
   const choose = async () => {
-    const asked = { kind: kind.value }
-    if (accuracy.value) asked.accuracy = +accuracy.value
-    else asked.count = +count.value || 20
-    if (noise.value) asked.noise = noise.value
-    if (!await change(table => { table.plan = asked })) return
+    const asked = { ...now(), kind: kind.value }
+    for (const [key, input] of fields) {
+      const text = input.value.trim()
+      if (!text) delete asked[key]
+      else asked[key] = key === 'within' ? text.split(',').map(part => part.trim()) : NUMBERS.includes(key) ? +text.replace(',', '.') : text
+    }
+    if (asked.count === undefined && asked.accuracy === undefined) asked.count = 20
+    if (asked.accuracy !== undefined && asked.count !== undefined) delete asked[document.activeElement === fields[0][1] ? 'accuracy' : 'count']
+    if (await change(table => { table.plan = asked })) await show()
+  }
+
+  const show = async () => {
+    fill()
+    if (!Object.keys(now()).length) return
     const found = await work('plan', 'choosing poses')
-    answer.replaceChildren()
-    for (const file of found.files) button(answer, `Save ${file}`, () => save(file), { className: 'first' })
-    const split = made('div', answer, { className: 'split' })
-    made('pre', split, { text: found.text, tabindex: 0 })
+    const split = made('div', null, { className: 'split' })
+    again(answer, () => {
+      const takes = made('div', answer, { className: 'choices' })
+      for (const file of found.files) button(takes, `Save ${file}`, () => save(file), { className: 'first' })
+      button(takes, 'Print a sheet to fill in', () => print())
+      answer.append(split)
+      made('pre', split, { text: found.text, tabindex: 0 })
+      sheet(answer, found.sheet)
+    })
     await draw(made('div', split, { className: 'picture' }), found.view)
   }
+  await show()
+  return show
+}
+
+// The poses one after the other, with a box to write each reading into; shown on paper alone.
+function sheet(parent, { title, head, rows, read }) {
+  const table = made('table', made('section', parent, { className: 'sheet' }))
+  made('caption', table, { text: title })
+  made('tr', table, {}, ...[...head, ...read].map(text => made('th', null, { text, scope: 'col' })))
+  for (const cells of rows) made('tr', table, {}, ...cells.map(text => made('td', null, { text })), ...read.map(() => made('td', null, { className: 'box' })))
 }

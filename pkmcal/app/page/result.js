@@ -1,15 +1,15 @@
 // How good it is: the verdict first, then rows, numbers and the picture, each of which refits.
-import { app, attempt, button, change, choice, field, made, work } from './frame.js'
+import { again, app, attempt, button, change, choice, made, work } from './frame.js'
+import { numbers } from './numbers.js'
 import { draw, selected } from './picture.js'
 
 const LEAST = 400 // rows that are listed at first: the worst
-let order = null
 
 export async function result(main) {
   made('h1', main, { text: 'How good is it?' })
   const verdict = made('section', main, { className: 'verdict', 'aria-live': 'polite' })
   const split = made('div', main, { className: 'split' })
-  const left = made('div', split), picture = made('div', left, { className: 'picture' })
+  const left = made('div', split), picture = made('div', left, { className: 'picture' }), picked = made('div', left, { className: 'picked' })
   const lists = made('div', split)
   const tabs = made('div', lists, { className: 'tabs' })
   const parts = { rows: made('div', lists), numbers: made('div', lists), table: made('div', lists) }
@@ -22,33 +22,50 @@ export async function result(main) {
   for (const [key, text] of Object.entries(shown)) button(tabs, text, () => pick(key), { 'data-part': key })
   const settings = made('div', lists, { className: 'settings' })
   const before = {}
+  const list = { order: [], named: null, all: false }
 
   const refit = async edit => {
     if (edit && !await change(table => { table.fit ??= {}; edit(table.fit) })) return
+    await show()
+  }
+  // one row, from the list or from the picture: named in both, and with its box
+  const name = (key, from) => {
+    list.named = key
+    for (const one of parts.rows.querySelectorAll('tr.named')) one.classList.remove('named')
+    const line = document.getElementById(`row ${key}`)
+    line?.classList.add('named')
+    if (from === 'picture') line?.scrollIntoView({ block: 'nearest' })
+    else selected(key)
+    again(picked, () => {
+      const row = app.found.rows.find(one => one.key === key)
+      if (row) made('label', picked, { className: 'tick' }, use(row, refit, 'picked'), made('span', null, { text: `use ${row.name}: ${short(row.before)} → ${short(row.after)} mm ${row.said}` }))
+    })
+  }
+
+  const show = async () => {
     const found = await work('fit', 'calibrating')
+    for (const row of found.rows) Object.assign(row, { use: row.use ?? '', said: row.said ?? '', drop: row.drop === undefined ? row.key : row.drop })
     app.found = found
-    say(verdict, found, refit)
-    held(settings, refit)
-    rows(parts.rows, found, refit)
-    numbers(parts.numbers, found, before, refit)
-    parts.table.replaceChildren()
-    made('pre', parts.table, { text: found.summary, tabindex: 0 })
+    again(verdict, () => say(verdict, found, refit))
+    again(settings, () => held(settings, refit))
+    again(parts.rows, () => rows(parts.rows, found, list, refit, name))
+    again(parts.numbers, () => numbers(parts.numbers, found, before, refit))
+    again(parts.table, () => made('pre', parts.table, { text: found.summary, tabindex: 0 }))
     for (const each of found.numbers) before[each.name] = each.stderr
-    if (found.view) await draw(picture, found.view, row => mark(row, true))
+    if (found.view) await draw(picture, found.view, key => name(key, 'picture'))
+    if (list.named) name(list.named, 'list')
     const counter = document.getElementById('main').dataset
     counter.fits = +counter.fits + 1
   }
   pick(app.part ?? 'rows')
-  await refit()
+  await show()
+  return show
 }
 
 function say(section, { verdict }, refit) {
-  section.replaceChildren()
   section.dataset.state = verdict.state
-  const sentence = verdict.text.split('\n').map(line => line.trim())
-  made('p', section, { className: 'state', text: sentence.join(' ').split(/ (?=also: |note: )/)[0] })
-  const others = verdict.said
-  for (const { level, text, remedies, check } of others) {
+  made('p', section, { className: 'state', text: verdict.head })
+  for (const { level, text, remedies, check } of verdict.said) {
     const item = made('div', section, { className: 'said', 'data-check': check })
     made('p', item, {}, made('b', null, { text: `${level}: ` }), text)
     for (const { option, fit } of remedies)
@@ -57,93 +74,58 @@ function say(section, { verdict }, refit) {
 }
 
 function held(parent, refit) {
-  parent.replaceChildren()
   const { fit = {}, measured = {} } = app.project.state, used = [...(measured.files ?? []), measured.controller]
   const files = app.project.files.filter(name => /\.(csv|tsv|txt|xlsx)$/i.test(name) && !used.includes(name))
+  const shares = [['', 'nothing'], ['0.2', 'a fifth of the poses'], ['0.5', 'half of the poses'], ...files.map(f => [f, f])]
+  const now = fit.holdout ?? ''
+  if (!shares.some(([key]) => key === now)) shares.push([now, now])
   const set = (name, value) => refit(table => { if (value) table[name] = value; else delete table[name] })
-  choice(parent, 'hold out', [['', 'nothing'], ['0.2', 'a fifth of the poses'], ['0.5', 'half of the poses'], ...files.map(f => [f, f])], fit.holdout ?? '', value => set('holdout', value))
+  choice(parent, 'hold out', shares, now, value => set('holdout', value))
   choice(parent, 'outliers', [['', 'count in full'], ['huber', 'count less'], ['cauchy', 'hardly count']], fit.loss ?? '', value => set('loss', value))
 }
 
-function mark(row, scroll) {
-  for (const one of document.querySelectorAll('tr.named')) one.classList.remove('named')
-  const line = document.getElementById(`row-${row}`)
-  line?.classList.add('named')
-  if (scroll) line?.scrollIntoView({ block: 'nearest' })
-}
-
 const short = x => (x === null || x === undefined ? '–' : Math.abs(x) >= 1000 ? x.toFixed(0) : Number(x.toPrecision(3)).toString())
-const placeOf = ({ file, line, row }) => (line > 0 ? `${file}:${line}` : `row ${row}`)
 
-function rows(parent, found, refit) {
-  parent.replaceChildren()
-  const wide = made('div', parent, { className: 'wide', tabindex: 0, role: 'region', 'aria-label': 'measured rows' })
-  const table = made('table', wide)
-  made('caption', table, { text: 'Measured rows, worst first: the distance from where the machine is, mm' })
-  made('tr', table, {}, ...['use', 'row', 'line', 'before', 'after'].map(text => made('th', null, { text, scope: 'col' })))
-  const use = (line, each, kept) => {
-    const number = String(each.row)
-    const box = made('input', made('td', line), { type: 'checkbox', 'aria-label': `use row ${each.row}` })
-    box.checked = kept
-    box.onclick = event => event.stopPropagation()
-    box.onchange = () => attempt(() => refit(fit => { // by number: a line may have several rows
+// A box that leaves a row out, or takes it back, by its number: a line may have several.
+function use(each, refit, where = '') {
+  const box = made('input', null, { type: 'checkbox', 'aria-label': `use ${each.name}`, 'data-key': `${where}use ${each.key}` })
+  box.checked = each.use !== 'left out'
+  box.disabled = each.drop === null
+  box.onclick = event => event.stopPropagation()
+  box.onchange = () => attempt(() => {
+    const { checked } = box
+    return refit(fit => {
       const out = new Set((fit.drop ?? []).flatMap(one => one.split(',').map(part => part.trim())))
-      if (fit['drop-outliers']) for (const one of found.dropped) out.add(String(one.row))
+      if (fit['drop-outliers']) for (const one of app.found.rows) if (one.use === 'left out') out.add(one.drop)
       delete fit['drop-outliers']
-      if (box.checked) for (const one of [number, `${each.file}:${each.line}`]) out.delete(one)
-      else out.add(number)
+      if (checked) for (const one of [each.drop, each.line]) out.delete(one)
+      else out.add(each.drop)
       fit.drop = [...out]
       if (!fit.drop.length) delete fit.drop
-    }))
-  }
-  for (const each of found.dropped) {
-    const line = made('tr', table, { className: 'out', id: `row-${each.row}` })
-    use(line, each, false)
-    for (const text of [each.row, placeOf(each), short(each.before), `${short(each.after)} left out`]) made('td', line, { text })
-  }
-  const worst = [...found.rows].sort((a, b) => (b.after ?? 0) - (a.after ?? 0)).slice(0, app.all ? Infinity : LEAST)
-  for (const each of worst) {
-    const line = made('tr', table, { id: `row-${each.row}`, className: each.outlier ? 'odd' : '' })
-    use(line, each, true)
-    const name = button(made('td', line), String(each.row), () => { mark(each.row); selected(each.row) }, { className: 'plain', 'aria-label': `show row ${each.row}` })
-    line.onclick = event => { if (event.target !== name) { mark(each.row); selected(each.row) } }
-    for (const text of [each.line > 0 ? placeOf(each) : '', short(each.before), `${short(each.after)}${each.outlier ? ' outlier' : ''}`]) made('td', line, { text })
-  }
-  if (worst.length < found.rows.length) button(parent, `show all ${found.rows.length} rows`, () => { app.all = true; rows(parent, found, refit) })
+    })
+  })
+  return box
 }
 
-function numbers(parent, found, before, refit) {
-  parent.replaceChildren()
-  const wide = made('div', parent, { className: 'wide', tabindex: 0, role: 'region', 'aria-label': 'numbers' })
+// Worst first when they are first shown; then each row keeps its place until it is asked otherwise.
+function rows(parent, found, list, refit, name) {
+  const place = new Map(list.order.map((key, k) => [key, k]))
+  const sorted = [...found.rows].sort((a, b) => (place.get(a.key) ?? Infinity) - (place.get(b.key) ?? Infinity) || 0)
+  const shown = sorted.slice(0, list.all ? Infinity : LEAST)
+  const moved = sorted.some((row, k) => row !== found.rows[k])
+  list.order = sorted.map(({ key }) => key)
+  const wide = made('div', parent, { className: 'wide', tabindex: 0, role: 'region', 'aria-label': 'measured rows' })
   const table = made('table', wide)
-  made('caption', table, { text: 'Numbers that are found; ± is one standard deviation' })
-  made('tr', table, {}, ...['find', 'number', 'value', '±', 'change', 'unit', 'knowledge'].map(text => made('th', null, { text, scope: 'col' })))
-  const free = () => app.project.state.fit?.free ?? ['default']
-  const fix = () => app.project.state.fit?.fix ?? []
-  for (const each of found.numbers) {
-    const line = made('tr', table), cell = made('td', line)
-    if (found.machine.includes(each.name)) {
-      const box = made('input', cell, { type: 'checkbox', 'aria-label': `find ${each.name}` })
-      box.checked = true
-      box.onchange = () => refit(fit => {
-        if (free().includes(each.name)) fit.free = free().filter(name => name !== each.name)
-        else fit.fix = [...fix(), each.name]
-        if (fit.free?.length === 1 && fit.free[0] === 'default') delete fit.free
-      })
-    }
-    const was = before[each.name], now = each.stderr
-    const trend = was && now ? (now < 0.98 * was ? 'better' : now > 1.02 * was ? 'worse' : '') : ''
-    const digits = now ? Math.max(0, Math.min(8, 1 - Math.floor(Math.log10(now)))) : 3
-    const texts = [each.name, each.after?.toFixed(digits) ?? '–', now === null ? '∞' : short(now), (each.after - each.before).toFixed(digits), each.unit, each.knowledge]
-    texts.forEach((text, k) => made('td', line, { text, className: k === 2 ? trend : '' }))
+  made('caption', table, { text: 'Measured rows: the distance from where the machine is, mm' })
+  made('tr', table, {}, ...['use', 'row', 'before', 'after', 'remark'].map(text => made('th', null, { text, scope: 'col' })))
+  for (const each of shown) {
+    const line = made('tr', table, { className: each.use ? 'out' : each.said ? 'odd' : '', id: `row ${each.key}` })
+    if (list.named === each.key) line.classList.add('named')
+    made('td', line, {}, use(each, refit))
+    const show = button(made('td', line), each.name, () => name(each.key, 'list'), { className: 'plain', 'aria-label': `show ${each.name}` })
+    line.onclick = event => { if (event.target !== show) name(each.key, 'list') }
+    for (const text of [short(each.before), short(each.after), each.said]) made('td', line, { text })
   }
-  for (const name of fix()) {
-    const line = made('tr', table), box = made('input', made('td', line), { type: 'checkbox', 'aria-label': `find ${name}` })
-    box.onchange = () => refit(fit => { fit.fix = fix().filter(one => one !== name); if (!fit.fix.length) delete fit.fix })
-    for (const text of [name, 'held', '', '', '', '']) made('td', line, { text })
-  }
-  const more = made('select', null, { onchange: () => more.value && refit(fit => { fit.free = [...new Set([...free(), more.value])] }) })
-  made('option', more, { value: '', text: '…' })
-  for (const name of found.others) made('option', more, { value: name, text: name })
-  field(parent, 'find another number, too', more)
+  if (moved) button(parent, 'sort, worst first', () => { list.order = []; again(parent, () => rows(parent, found, list, refit, name)) })
+  if (shown.length < sorted.length) button(parent, `show all ${sorted.length} rows`, () => { list.all = true; again(parent, () => rows(parent, found, list, refit, name)) })
 }

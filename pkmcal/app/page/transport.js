@@ -7,8 +7,10 @@ if (fragment.get('t')) {
 const tab = crypto.randomUUID()
 const headers = { 'x-pkmcal-token': localStorage.getItem('token') ?? '', 'x-pkmcal-tab': tab }
 
+export const ENDED = 'The server of this window does not answer: it was ended in its terminal. What was shown is kept in its folder; start pkmcal app there again.'
+
 async function ask(path, settings = {}) {
-  const answer = await fetch(path, { ...settings, headers })
+  const answer = await fetch(path, { ...settings, headers }).catch(() => { throw Error(settings.method === 'PUT' ? `This cannot be read, or the server ended: ${settings.body.name}` : ENDED) })
   if (answer.status === 401) throw Error('This page has no right to this server: open it from the terminal again.')
   if (!answer.ok && answer.status !== 409) throw Error((await answer.json().catch(() => ({}))).error ?? `${answer.status}`)
   return answer
@@ -32,7 +34,7 @@ export async function undo(version) {
 
 export async function send(file) {
   const answer = await ask(`/api/file/${encodeURIComponent(file.name || 'file')}`, { method: 'PUT', body: file })
-  return (await answer.json()).name
+  return answer.json() // its name here, and what there is to say
 }
 
 export const run = (operation, given) => post(`/api/run/${operation}`, given).then(lines)
@@ -54,7 +56,7 @@ async function* lines(answer) {
   const reader = answer.body.pipeThrough(new TextDecoderStream()).getReader()
   let rest = ''
   for (;;) {
-    const { value, done } = await reader.read()
+    const { value, done } = await reader.read().catch(() => ({ done: true }))
     if (done) return
     const parts = (rest + value).split('\n')
     rest = parts.pop()

@@ -6,7 +6,8 @@ class Calibration {
   constructor(core, data, mover, side, redraw) {
     const { points, change } = data.calibration
     Object.assign(this, { core, data, mover, points, change, when: 'before', named: null, redraw })
-    const long = points.map(p => norm(p.before)).sort((a, b) => a - b)[Math.floor(0.9 * points.length)] || 1
+    this.fitted = points.filter(p => !p.aside) // others are left out or held out
+    const long = this.fitted.map(p => norm(p.before)).sort((a, b) => a - b)[Math.floor(0.9 * this.fitted.length)] || 1
     this.times = this.rounded(Math.min(LARGEST, (SEEN * data.size) / long))
     this.exaggeration = 0
     if (points.length) this.arrows(side)
@@ -57,14 +58,14 @@ class Calibration {
   update(redraw = true) {
     this.switches.forEach(button => button.setAttribute('aria-pressed', button.textContent === this.when))
     this.shown.textContent = `× ${this.times}`
-    const off = this.points.map(p => norm(p[this.when])), rms = Math.sqrt(off.reduce((sum, x) => sum + x * x, 0) / off.length)
+    const off = this.fitted.map(p => norm(p[this.when])), rms = Math.sqrt(off.reduce((sum, x) => sum + x * x, 0) / off.length)
     this.found.textContent = `${off.length} points: ${short(rms)} mm rms, longest ${short(Math.max(...off))} mm`
     if (redraw) this.redraw()
   }
 
   // what is drawn with the machine
   add(bodies) {
-    for (const p of this.points) bodies.list.push({ arrow: [p.at, add(p.at, p[this.when], this.times)], colour: p.outlier ? 'bad' : this.when })
+    for (const p of this.points) bodies.list.push({ arrow: [p.at, add(p.at, p[this.when], this.times)], colour: p.outlier ? 'bad' : p.aside ? 'dim' : this.when })
     if (this.points.length) {
       const one = this.rounded((0.12 * this.data.size) / this.times)
       this.key = { long: one * this.times, text: `${Number(one.toPrecision(3))} mm` }
@@ -74,7 +75,7 @@ class Calibration {
   }
 
   wordsOf(point) {
-    return `${point.name}: ${short(norm(point.before))} → ${short(norm(point.after))} mm${point.outlier ? ', outlier' : ''}`
+    return `${point.name}: ${short(norm(point.before))} → ${short(norm(point.after))} mm${point.outlier ? ', outlier' : ''}${point.aside ? `, ${point.aside}` : ''}`
   }
 
   // the machine with its change the other way, so many times
