@@ -108,35 +108,52 @@ def read(job: Planning, inputs: Inputs) -> Sources:
 
 def planned(job: Planning, sources: Sources) -> Plan:
     """Choose the poses of a plan whose files have been read."""
-    machine = sources.robot
-    seen = as_machine(machine)
+    several = isinstance(kinds_of(job), dict)
+    payloads = [] if job.payloads is None else job.payloads.split(",")
+    return plan_poses(
+        sources.robot,
+        candidates(job, sources),
+        count=30 if job.count is None and job.accuracy is None and not several else job.count,
+        accuracy=job.accuracy,
+        travel_weight=job.travel_weight,
+        payloads=[mass("--payloads", each) for each in payloads],
+        measured=sources.measured,
+        **options(job, sources),
+    )
+
+
+def options(job: Planning, sources: Sources) -> dict[str, Any]:
+    """What plans and the choice of a next pose take alike, beside machine and candidates.
+
+    Raises
+    ------
+    ValueError
+        An option that says nothing of this machine, or of what is measured.
+    """
+    seen = as_machine(sources.robot)
     free = free_names(seen, job.free)
     kinds = kinds_of(job)
-    several = isinstance(kinds, dict)
     pictures = planned_camera(job) if kinds == "pixel" else None
     if pictures is None and (job.camera is not None or job.board is not None):
         raise ArgumentError("--camera, --board: they are of pictures; state --kind pixel")
-    payloads = [] if job.payloads is None else job.payloads.split(",")
-    return plan_poses(
-        machine,
-        _candidates(job, machine) if sources.poses is None else sources.poses,
-        count=30 if job.count is None and job.accuracy is None and not several else job.count,
-        accuracy=job.accuracy,
-        targets=sources.targets,
-        criterion=word("--criterion", job.criterion, CRITERIA),
-        kind=kinds if pictures is None else pictures,
-        target=_points(job.target, kinds),
-        noise=_noise(job.noise, kinds),
-        actuator_noise=job.actuator_noise,
-        travel_weight=job.travel_weight,
-        payloads=[mass("--payloads", each) for each in payloads],
-        effects=_effects(job.effects or ["none"]),
-        free=free or None,
-        prior=read_prior(job.prior, seen, free),
-        unknown=[word("--unknown", each, UNKNOWN) for each in job.unknown],
-        measured=sources.measured,
-        direction=None if job.direction is None else axis(job.direction),
-    )
+    return {
+        "targets": sources.targets,
+        "criterion": word("--criterion", job.criterion, CRITERIA),
+        "kind": kinds if pictures is None else pictures,
+        "target": _points(job.target, kinds),
+        "noise": _noise(job.noise, kinds),
+        "actuator_noise": job.actuator_noise,
+        "effects": _effects(job.effects or ["none"]),
+        "free": free or None,
+        "prior": read_prior(job.prior, seen, free),
+        "unknown": [word("--unknown", each, UNKNOWN) for each in job.unknown],
+        "direction": None if job.direction is None else axis(job.direction),
+    }
+
+
+def candidates(job: Planning, sources: Sources) -> FloatArray:
+    """Poses to choose from."""
+    return _candidates(job, sources.robot) if sources.poses is None else sources.poses
 
 
 def axis(text: str) -> list[float]:

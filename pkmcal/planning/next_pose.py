@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal.arguments import whole, word
 from pkmcal.arms.arm import SerialArm
-from pkmcal.arrays import BoolArray, FloatArray
+from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.core.library import POSE
 from pkmcal.display import Table, fixed
 from pkmcal.effects.effect import Effects
@@ -43,6 +44,12 @@ class NextPose(Result):
     _choice: Offered
     _design: Design
     _free: BoolArray  # candidates that were not measured
+    _first: tuple[int, ...] = ()  # those that come before any others: the fewest that will do
+
+    @property
+    def indices(self) -> IntArray:
+        """Candidates that can be measured and have not been, in their order."""
+        return self._choice.indices[self._free]
 
     @property
     def left(self) -> int:
@@ -105,23 +112,37 @@ class NextPose(Result):
         ValueError
             A candidate that cannot be measured: it was left out.
         """
-        if index is None:
-            at = self._best
-        else:
-            number = whole("index", index, 0, self._choice.given - 1, ", the candidates")
-            places = np.flatnonzero(self._choice.indices == number)
-            if not len(places):
-                raise ArgumentError(f"index: candidate {number} was left out, found {index!r}")
-            at = int(places[0])
+        at = self._best if index is None else self._place(index)
+        return replace(self, _design=self._design.beside(at), **self._but(at))
+
+    def without(self, index: int) -> NextPose:
+        """Choose again without a candidate, at which nothing can be measured.
+
+        Raises
+        ------
+        ValueError
+            A candidate that was left out already.
+        """
+        return replace(self, **self._but(self._place(index)))
+
+    def _place(self, index: int) -> int:
+        number = whole("index", index, 0, self._choice.given - 1, ", the candidates")
+        places = np.flatnonzero(self._choice.indices == number)
+        if not len(places):
+            raise ArgumentError(f"index: candidate {number} was left out, found {index!r}")
+        return int(places[0])
+
+    def _but(self, at: int) -> dict[str, Any]:
+        """What is left to choose from without a candidate."""
         free = self._free.copy()
         free[at] = False
-        return replace(self, _design=self._design.beside(at), _free=free)
+        return {"_free": free, "_first": tuple(each for each in self._first if each != at)}
 
     @cached_property
     def _best(self) -> int:
         if not self.left:
             raise ArgumentError("candidates: all of them are measured; offer others")
-        return self._design.best(self._free)
+        return self._first[0] if self._first else self._design.best(self._free)
 
     def _parts(self) -> Iterator[str | Table]:
         where = along(self.direction)
@@ -156,8 +177,9 @@ def next_pose(
 ) -> NextPose:
     """Choose the pose to measure next, beside rows that are there.
 
-    The pose that a plan of one more would choose. What each candidate brings is computed once;
-    `NextPose.after` then takes some milliseconds.
+    The pose that a plan of one more would choose; where nothing is measured, first those of a plan
+    of as many as there have to be. What each candidate brings is computed once; `NextPose.after`
+    then takes some milliseconds.
 
     Parameters
     ----------
@@ -213,4 +235,8 @@ def next_pose(
         measured=measured,
     )
     axis = None if direction is None else np.asarray(direction, dtype=np.float64)
-    return NextPose(robot, axis, choice, choice.design, ~np.isin(choice.indices, done))
+    left = ~np.isin(choice.indices, done)
+    first: tuple[int, ...] = ()
+    if left.all() and (fewest := choice.design.fewest()) > 1:
+        first = tuple(choice.design.grown(min(fewest, len(left))).tolist())
+    return NextPose(robot, axis, choice, choice.design, left, first)

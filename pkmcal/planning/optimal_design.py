@@ -153,6 +153,13 @@ class Design:
         made._prior = self._prior + block.T @ block
         return made
 
+    def fewest(self) -> int:
+        """How many candidates it takes at least to identify what those that are there do not."""
+        nothing = np.array([], dtype=np.intp)
+        information = np.linalg.eigvalsh(self._information(nothing))
+        lacking = int((information < _NOTHING).sum())
+        return -(-lacking // int(self._blocks.shape[1]))
+
     def best(self, allowed: BoolArray) -> int:
         """The candidate that helps most, of those that are allowed (N,)."""
         gains = self._gains([], self._lacking([]), self._all)
