@@ -19,9 +19,8 @@ from pkmcal.live.replay import places, replayed
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 PRINTER = Path(__file__).resolve().parents[1] / "examples" / "linear-delta" / "robot.toml"
-import os
 
-RUNS, NOISE, UP = int(os.environ.get("RUNS", 1000)), 0.03, (0.0, 0.0, 1.0)
+RUNS, NOISE, UP = 1000, 0.03, (0.0, 0.0, 1.0)
 WITHIN = 1.1  # of the misfit of all rows: enough
 TURNS = np.array([13.21144, 14.0456, 13.8233, 14.124109, 14.16007, 14.03256]) * 1e-3  # per mm
 

@@ -153,10 +153,9 @@ def driven(
     candidates = planning.candidates(job, sources)
     opened: list[Any] = []
     try:
-        head = provenance.comment(
-            {Path(name).name: content for name, content in inputs.contents().items()
-             if name == job.robot or not Path(name).exists()}
-        )  # fmt: skip
+        own = Inputs()
+        own.robot(job.robot)
+        head = provenance.comment({Path(at).name: file for at, file in own.contents().items()})
         log = RowLog(Path(out), robot, kind, sigma, None if target is None else target[0], head)
         opened.append(log)
         for note in log.notes:

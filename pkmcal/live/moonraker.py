@@ -19,7 +19,7 @@ from pkmcal.live.http import Server
 
 _MOVE = 600.0  # s that a move may take
 _SAID = 100  # answers that are looked through for that of GET_POSITION
-_TRIED, _PAUSE = 40, 0.05  # how often it is looked for, and s between
+_ASKED, _TRIED, _PAUSE = 5, 20, 0.05  # how often it is asked and looked for, and s between
 _NUMBER = r"(-?\d+(?:\.\d+)?)"
 _STEPPERS = re.compile(r"^(?:// )?stepper: (.*)$", re.MULTILINE)
 _TOOLHEAD = re.compile(rf"^(?:// )?toolhead: X:{_NUMBER} Y:{_NUMBER} Z:{_NUMBER}", re.MULTILINE)
@@ -94,8 +94,9 @@ class Moonraker:
     def _position(self) -> str:
         """What GET_POSITION answers: the newest of its answers, and one that is new."""
         last = max((time for time, _ in self._answers()), default=-1.0)
-        self._run("GET_POSITION")
-        for _ in range(_TRIED):
+        for turn in range(_ASKED * _TRIED):
+            if turn % _TRIED == 0:  # just restarted, Moonraker may not have heard the first
+                self._run("GET_POSITION")
             new = [said for time, said in self._answers() if time > last and "stepper:" in said]
             if new:
                 return new[-1]
