@@ -74,7 +74,8 @@ class Server:
             with self._open(request, timeout=wait) as answer:
                 found: bytes = answer.read(_LONGEST + 1)
         except urllib.error.HTTPError as error:
-            raise DeviceError(f"{self._what}: {_said(error)}") from None
+            with error:
+                raise DeviceError(f"{self._what}: {_said(error)}") from None
         except (OSError, ValueError, urllib.error.URLError) as error:
             reason = getattr(error, "reason", None) or error
             raise DeviceError(f"{self._what} does not answer: {reason}") from None

@@ -18,6 +18,7 @@ from pkmcal.live.lines import Lines
 
 _PORT = 5007
 _MOVE, _PAUSE = 600.0, 0.05  # s that a move may take, and between questions
+_RESTS = 20  # looks at rest after which a move that has not arrived has ended elsewhere
 _THERE = 1e-3  # mm, deg that a place may differ from the command by
 _PASSWORDS = ("EMC", "EMCTOO")  # of the program where none are stated
 
@@ -30,9 +31,13 @@ class LinuxCNC:
     def __init__(self, address: str, robot: Robot) -> None:
         self._robot = robot
         self._axes = [POSE.index(name) for name in robot.model.match or robot.coordinates]
-        where = host_and_port(address, _PORT, "linuxcnc")
-        self._lines, self._where = Lines(*where, "linuxcncrsh"), where
-        _greet(self._lines)
+        self._where = host_and_port(address, _PORT, "linuxcnc")
+        self._lines = Lines(*self._where, "linuxcncrsh")
+        try:
+            _greet(self._lines)
+        except BaseException:
+            self._lines.close()
+            raise
 
     def require_ready(self) -> None:
         """Raise a `DeviceError` unless it is on, homed and idle."""
@@ -43,6 +48,7 @@ class LinuxCNC:
             raise DeviceError("LinuxCNC is not homed: home all joints")
         if self._get("program_status") != "IDLE":
             raise DeviceError("LinuxCNC runs a program: wait until it has ended")
+        self._set(f"enable {_PASSWORDS[1]}")  # of several connections one has it
         self._set("mode mdi")
 
     def go(self, pose: FloatArray, feed: float) -> None:
@@ -50,16 +56,18 @@ class LinuxCNC:
         wanted = np.r_[pose[:3], np.degrees(pose[3:])]
         words = " ".join(f"{'XYZABC'[i]}{wanted[i]:.6f}" for i in self._axes)
         self._set(f"mdi G21 G90 G53 G1 {words} F{feed:.2f}")
-        end = monotonic() + _MOVE
+        end, idle = monotonic() + _MOVE, 0
         while True:
             if self._get("machine") != "ON":
                 raise DeviceError("LinuxCNC went off in a move")
             off = np.abs(self._numbers("abs_act_pos")[self._axes] - wanted[self._axes]).max()
-            if off < _THERE and self._get("program_status") == "IDLE":
+            idle = idle + 1 if self._get("program_status") == "IDLE" else 0
+            if idle and off < _THERE:
                 return
-            said = self._get("error")
-            if said not in ("OK", ""):
-                raise DeviceError(f"LinuxCNC: {said}")
+            if idle > _RESTS:
+                raise DeviceError(
+                    f"LinuxCNC stopped {off:.3f} from the pose; it says: {self._get('error')}"
+                )
             if monotonic() > end:
                 raise DeviceError(f"LinuxCNC is {off:.3f} from the pose after {_MOVE:g} s")
             sleep(_PAUSE)
@@ -77,20 +85,18 @@ class LinuxCNC:
     def stop(self) -> None:
         """Emergency stop, by a connection of its own: `go` may be waiting at the other."""
         lines = Lines(*self._where, "linuxcncrsh", wait=3.0)
-        _greet(lines)
-        lines.send("set estop on")
-        lines.close()
+        try:
+            _greet(lines)
+            _set(lines, "estop on")
+        finally:
+            lines.close()
 
     def close(self) -> None:
         """Close the connection."""
         self._lines.close()
 
     def _set(self, words: str) -> None:
-        self._lines.send(f"set {words}")
-        while "NAK" not in (said := self._lines.line()):
-            if "ACK" in said:
-                return
-        raise DeviceError(f"LinuxCNC refuses {words!r}: {said}")
+        _set(self._lines, words)
 
     def _get(self, name: str) -> str:
         self._lines.send(f"get {name}")
@@ -106,9 +112,19 @@ class LinuxCNC:
 def _greet(lines: Lines) -> None:
     connect, enable = _PASSWORDS
     lines.send(f"hello {connect} pkmcal 1.0")
-    while "HELLO" not in (said := lines.line()).upper():
+    while "HELLO" not in (said := lines.line()).upper().split(maxsplit=1)[:1]:
         continue
-    if "NAK" in said:
+    if "ACK" not in said:
         raise DeviceError(f"linuxcncrsh refuses: {said}")
-    for words in ("echo off", "verbose on", f"enable {enable}"):
-        lines.send(f"set {words}")
+    lines.send("set echo off")
+    for words in ("verbose on", f"enable {enable}"):
+        _set(lines, words)
+
+
+def _set(lines: Lines, words: str) -> None:
+    lines.send(f"set {words}")
+    name = f"SET {words.split()[0].upper()}"
+    while not (said := lines.line()).startswith((f"{name} ACK", f"{name} NAK")):
+        continue
+    if said.endswith("NAK"):
+        raise DeviceError(f"LinuxCNC refuses {words!r}")
