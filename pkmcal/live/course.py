@@ -75,12 +75,13 @@ class Course:
     poses : int
         How many poses they are of.
     scatter : float
-        Of the rows over what was stated, 1 where that cannot be said or is less; of unstated noise
-        the largest that is likely, mm.
+        Of the rows of `found` over what was stated, 1 where it is less; of unstated noise the
+        largest that is likely, mm; NaN where that cannot be said.
     odd : Odd or None
         Whether the newest rows contradict those before.
     found : Identification or None
-        The calibration of all rows; None while they are too few.
+        The calibration of all rows where it is `over`, else of those before the newest; None while
+        they are too few.
     """
 
     choice: NextPose
@@ -129,12 +130,17 @@ class Course:
             All rows, the new ones last.
         """
         before = 0 if self.rows is None else len(self.rows)
-        new = rows.select(slice(before, None))
-        odd = None if self.rows is None else self._odd(new)
+        found = self._identified(self.rows, holdout=rows.select(slice(before, None)))
         made = replace(
-            self, choice=self.choice.after(index), rows=rows, poses=self.poses + 1, odd=odd
+            self,
+            choice=self.choice.after(index),
+            rows=rows,
+            poses=self.poses + 1,
+            found=found,
+            scatter=self._scatter(found),
+            odd=_odd(found),
         )
-        return made.fitted()
+        return made.fitted() if made.over else made
 
     def without(self, index: int) -> Course:
         """Take a candidate away at which nothing was seen."""
@@ -142,21 +148,13 @@ class Course:
 
     def fitted(self) -> Course:
         """Fit all rows and see how they scatter."""
-        if self.rows is None or not np.isfinite(self.choice.predicted):
-            return self
         found = self._identified(self.rows)
-        return self if found is None else replace(self, found=found, scatter=self._scatter(found))
+        return replace(self, found=found, scatter=self._scatter(found))
 
-    def _odd(self, new: Measurements) -> Odd | None:
-        """Whether rows contradict those that are there, by a calibration without them."""
-        if self.found is None or self.found.dof < 1 or self.rows is None:
+    def _identified(self, rows: Measurements | None, **also: Any) -> Identification[Any] | None:
+        """A calibration; None of too few rows."""
+        if rows is None or len(rows) * max(len(rows.components), 1) < len(self.choice.parameters):
             return None
-        found = self._identified(self.rows, holdout=new)
-        if found is None or not found.holdout_chance < CHANCE:
-            return None
-        return Odd(found.holdout_rms, found.holdout_expected, found.holdout_chance)
-
-    def _identified(self, rows: Measurements, **also: Any) -> Identification[Any] | None:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)
             try:
@@ -164,10 +162,17 @@ class Course:
             except ArgumentError:  # too few for what is to be found
                 return None
 
-    def _scatter(self, found: Identification[Any]) -> float:
+    def _scatter(self, found: Identification[Any] | None) -> float:
+        if found is None or found.dof < 1:
+            return float("nan")
         if self.stated:
             squares = found.chi2_per_dof
             return max(1.0, float(np.sqrt(squares))) if np.isfinite(squares) else float("nan")
-        if found.dof < 1:
-            return float("nan")
         return float(found.noise[0] * np.sqrt(found.dof / chdtri(found.dof, _SURE)))
+
+
+def _odd(found: Identification[Any] | None) -> Odd | None:
+    """Whether rows that were held out contradict those before."""
+    if found is None or found.dof < 1 or not found.holdout_chance < CHANCE:
+        return None
+    return Odd(found.holdout_rms, found.holdout_expected, found.holdout_chance)

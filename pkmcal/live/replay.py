@@ -16,7 +16,7 @@ from pkmcal.measurements.measurements import Measurements
 
 
 def places(robot: Robot | SerialArm, log: Measurements) -> tuple[FloatArray, list[IntArray]]:
-    """Where each pose of a log was measured, and its rows.
+    """Where each pose of a log was measured, in the order of their first rows, and its rows.
 
     Returns
     -------
@@ -31,7 +31,7 @@ def places(robot: Robot | SerialArm, log: Measurements) -> tuple[FloatArray, lis
         The machine has no pose at some rows.
     """
     index = log.pose_index
-    rows = [np.flatnonzero(index == i) for i in range(int(index.max()) + 1)]
+    rows = [np.flatnonzero(index == i) for i in dict.fromkeys(index.tolist())]
     at = log.actuators[[own[0] for own in rows]]
     if isinstance(robot, SerialArm):
         return at, rows

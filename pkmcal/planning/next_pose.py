@@ -47,6 +47,11 @@ class NextPose(Result):
     _first: tuple[int, ...] = ()  # those that come before any others: the fewest that will do
 
     @property
+    def parameters(self) -> tuple[str, ...]:
+        """What the calibration is to find."""
+        return self._choice.parameters.names
+
+    @property
     def indices(self) -> IntArray:
         """Candidates that can be measured and have not been, in their order."""
         return self._choice.indices[self._free]
