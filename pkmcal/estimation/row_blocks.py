@@ -19,7 +19,7 @@ from pkmcal.estimation.session_machines import Machines
 
 @dataclass(frozen=True, eq=False)
 class RowBlocks:
-    """Which equations count together, and whose noise they have.
+    """Blocks of equations that count together, and the noise of each.
 
     Attributes
     ----------

@@ -45,7 +45,7 @@ Tell = Callable[[str], object]  # takes a line on what was assumed
 
 @dataclass(frozen=True)
 class Sources:
-    """What was read of a calibration.
+    """Files of a calibration as they were read.
 
     Attributes
     ----------
@@ -189,7 +189,7 @@ def _anew(job: Calibration) -> list[str]:
 
 
 def _unknown(job: Calibration, measured: Sequence[Measurements]) -> dict[Role, Known | list[Known]]:
-    """What ``--frame``, ``--target`` and ``--attachment`` say of each file."""
+    """Return the unknowns by ``--frame``, ``--target`` and ``--attachment``, for each file."""
     return {
         "frame": _known("--frame", job.frame, measured),
         "target": _known("--target", job.target, measured),
@@ -198,7 +198,7 @@ def _unknown(job: Calibration, measured: Sequence[Measurements]) -> dict[Role, K
 
 
 def _known(option: str, text: str, measured: Sequence[Measurements]) -> Known | list[Known]:
-    """One word for all files, or one for each."""
+    """Return words, one for all files or one for each."""
     words = [word(option, part.strip(), KNOWN) for part in text.split(",")]
     if len(words) not in (1, len(measured)):
         raise ArgumentError(f"{option} {text}: {len(words)} words for {len(measured)} files")

@@ -55,7 +55,7 @@ class Planning(OfMachine):
         return command("plan", [self.robot], self.options())
 
     def in_folder(self, folder: str) -> Planning:
-        """The same with its relative paths below a folder: those of a project file."""
+        """Return the job with its relative paths, those of a project file, below a folder."""
         found = super().in_folder(folder)
         board = board_file(self.board)
         return found if board is None else replace(found, board=below(folder, board))

@@ -1,4 +1,4 @@
-"""How files of measurements are read, as options and tables say it."""
+"""How files of measurements are read: one object for options and tables."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pkmcal.jobs.stated import PathText, Refuse, Stated, below
 
 @dataclass(frozen=True)
 class Reading(Stated):
-    """How files are read: the options of that of `pkmcal calibrate` and `pkmcal check`.
+    """Reading of files: the options of `pkmcal calibrate` and `pkmcal check` for it.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class Reading(Stated):
 
     @property
     def names(self) -> dict[str, str]:
-        """What is read as what."""
+        """The names of columns, and what each is read as."""
         return dict(map(_renamed, self.rename))
 
     def table(self) -> dict[str, Any]:
@@ -87,7 +87,7 @@ class Reading(Stated):
         return super().values_of_table(table, refuse)
 
     def in_folder(self, folder: str) -> Reading:
-        """The same with its relative paths below a folder."""
+        """Return the options with their relative paths, those of a project file, below a folder."""
         found = super().in_folder(folder)
         board = board_file(self.board)
         return found if board is None else replace(found, board=below(folder, board))

@@ -1,4 +1,4 @@
-"""Which poses to measure, so that a calibration knows best where the machine goes."""
+"""Choice of poses to measure, so that a calibration knows best where the machine goes."""
 
 from __future__ import annotations
 
@@ -341,7 +341,7 @@ def plan_poses(
 def _counts(
     kind: Planned | Mapping[Any, int], count: object, accuracy: object
 ) -> dict[Planned, int | None]:
-    """How many poses of each kind; None where an accuracy decides."""
+    """Return the number of poses of each kind; None where an accuracy decides."""
     if isinstance(kind, Mapping):
         if not kind or count is not None or accuracy is not None:
             raise ArgumentError(
@@ -366,7 +366,7 @@ def _weight(given: object, accuracy: object, criterion: Criterion) -> float:
 
 
 def _drives(robot: Calibratable, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """How far the drives are out (N, n), and at home, mm, angles as arcs; zero of an arm.
+    """Return the way of the drives (N, n), and at home, mm, angles as arcs; zero of an arm.
 
     Lengths and angles, whatever the actuators read: those may be steps or turns.
     """

@@ -18,7 +18,8 @@ from pkmcal.files.csv_writer import WrittenColumn
 from pkmcal.readings import joint_angles
 from pkmcal.readings.distances import ZERO
 from pkmcal.readings.measured import InFit, Measured
-from pkmcal.readings.reading import At, Components, Predicted, Reading, Sets, Solve
+from pkmcal.readings.predicted import At, Predicted
+from pkmcal.readings.reading import Components, Reading, Sets, Solve
 from pkmcal.readings.unknowns import Dependence, Found, Start, always
 
 _COLUMN = re.compile(r"angle:(.+)")
@@ -63,7 +64,7 @@ class Angle(Reading):
         return Predicted(values, by_twist, {"zero": np.full((len(m), 1, 1), -1.0)})
 
     def follows_pose(self, machine: Any) -> bool:
-        """Of a pulley's swivel it does; joints of a chain are where that closes."""
+        """Return True for a pulley's swivel; joints of a chain follow from its closure."""
         return joint_angles.follows_pose(machine, str(self.joint))
 
     def by_geometry(self, at: At, places: IntArray) -> FloatArray | None:
@@ -116,7 +117,7 @@ class Angle(Reading):
         return self, values
 
     def found_in(self, table: Table) -> list[str]:
-        """Each column ``angle:JOINT``."""
+        """Find the columns ``angle:JOINT``."""
         return [name for name in table.columns if _COLUMN.fullmatch(name)]
 
     def names(self, table: Table) -> set[str]:

@@ -30,7 +30,8 @@ from pkmcal.readings.boards import Board
 from pkmcal.readings.lens_doubts import facing, lens_doubts
 from pkmcal.readings.lens_files import read_lens
 from pkmcal.readings.measured import InFit, Measured
-from pkmcal.readings.reading import At, Predicted, Reading, Sets, Solve
+from pkmcal.readings.predicted import At, Predicted
+from pkmcal.readings.reading import Reading, Sets, Solve
 from pkmcal.readings.seen_places import disagreement, in_agreement
 from pkmcal.readings.sight import visible
 from pkmcal.readings.unknowns import PLACE, Dependence, Numbers, Start, always
@@ -218,7 +219,7 @@ class Camera(Reading):
         )
 
     def dependences(self, data: InFit) -> Iterator[Dependence]:
-        """What is mounted on the platform; the lens and the size of the board."""
+        """Return what is on the platform, the lens, and the size of the board."""
         m = data.measured
         count, every = len(m), np.zeros(len(m), dtype=np.intp)
         yield always("tool", "tool", PLACE, [self._carried_thing] * count, data.starts)
@@ -236,7 +237,7 @@ class Camera(Reading):
             yield Dependence("size", "size", np.zeros((count, 1)), {"": number}, every)
 
     def starts(self, machine: Any, sets: Sets, found: Starts) -> None:
-        """At the platform; `places_seen` puts it in its place together with the frame."""
+        """Start at the platform; `places_seen` finds the place together with the frame."""
         for data, _ in sets:
             thing = data.measured.instrument._carried_thing
             found["tool", thing] = Start(tuple(range(6)), np.zeros(6))
@@ -296,7 +297,7 @@ class Camera(Reading):
         return pictures_told(self._corners(len(m)), m.values, self._pictures(m))
 
     def arguments(self, m: Measured) -> dict[str, FloatArray]:
-        """What is mounted where, as a simulation was told."""
+        """Return the mountings, as a simulation was told."""
         return {"tool": as_rows("carried", self.carried, 6)[0][0]}
 
     def simulated(self, m: Measured, solve: Solve) -> FloatArray:
@@ -355,7 +356,7 @@ class Camera(Reading):
 
     @property
     def _carried_thing(self) -> str:
-        """What of both is on the platform."""
+        """The one of camera and board that is on the platform."""
         return "board" if self.on == "base" else "camera"
 
     def _corners(self, count: int) -> FloatArray:
@@ -385,7 +386,7 @@ class Camera(Reading):
         )
 
     def _pictures(self, m: Measured) -> IntArray:
-        """Which picture each row is of, (N,), counted from 0."""
+        """Return the picture of each row, (N,), counted from 0."""
         if m.group is not None:
             return np.unique(m.group, return_inverse=True)[1].reshape(-1)
         return np.unique(m.actuators, axis=0, return_inverse=True)[1].reshape(-1)

@@ -9,7 +9,8 @@ import numpy as np
 from pkmcal.arrays import FloatArray
 from pkmcal.files.csv_table import Table
 from pkmcal.readings.measured import Measured
-from pkmcal.readings.reading import At, Predicted, Reading
+from pkmcal.readings.predicted import At, Predicted
+from pkmcal.readings.reading import Reading
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,5 +28,5 @@ class Closure(Reading):
         return []
 
     def title(self, m: Measured) -> str:
-        """How many rows."""
+        """Return a title: how many rows there are."""
         return f"{len(m)} row{'' if len(m) == 1 else 's'} of actuators alone"

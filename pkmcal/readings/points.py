@@ -14,7 +14,8 @@ from pkmcal.files.column_names import is_turned
 from pkmcal.files.csv_table import Table
 from pkmcal.readings.alignment import Laid, Sighting, frame_of_points, of_heights
 from pkmcal.readings.measured import InFit, Measured
-from pkmcal.readings.reading import At, Predicted, Reading
+from pkmcal.readings.predicted import At, Predicted
+from pkmcal.readings.reading import Reading
 from pkmcal.readings.unknowns import POINT, Dependence, point
 
 ORIGIN = np.zeros(3)
@@ -23,7 +24,7 @@ PLACE_TITLE = "x, y, z"
 
 @dataclass(frozen=True, eq=False)
 class Position(Reading):
-    """Where a point of the platform is."""
+    """Position of a point of the platform."""
 
     name = "position"
     components = POINT
@@ -56,7 +57,7 @@ class Position(Reading):
 
 @dataclass(frozen=True, eq=False)
 class Height(Position):
-    """How high a point of the platform is."""
+    """Height of a point of the platform."""
 
     name = "height"
     components = (("z", "mm"),)

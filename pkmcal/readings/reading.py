@@ -10,8 +10,7 @@ row touches.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, ClassVar, Literal, NamedTuple, Protocol, TypeVar
 
 import numpy as np
@@ -24,12 +23,12 @@ from pkmcal.files.csv_writer import WrittenColumn
 from pkmcal.readings import orientation, rows
 from pkmcal.readings.alignment import Laid, Sighting
 from pkmcal.readings.measured import InFit, Measured
+from pkmcal.readings.predicted import At, Predicted, require_predicted
 from pkmcal.readings.unknowns import Dependence, Found
 
 Components = tuple[tuple[str, str], ...]
 Sets = Sequence[tuple[InFit, FloatArray]]  # rows of a calibration, and their nominal poses
 Own = TypeVar("Own", bound="Reading")
-NOWHERE = np.zeros(6)
 
 
 class Solve(Protocol):
@@ -41,32 +40,6 @@ class Solve(Protocol):
 
     def __call__(self, actuators: FloatArray, argument: str) -> Any:
         """Solve rows of actuators; what cannot be solved is refused as this argument's fault."""
-
-
-@dataclass(frozen=True)
-class Predicted:
-    """Readings of one kind and their derivatives.
-
-    Attributes
-    ----------
-    values : ndarray (N, k)
-        In the units of the components. Derivatives of the three angles of orientations are those
-        of the turning in the instrument's axes.
-    by_twist : ndarray (N, k, 6)
-        Derivative to the twist of the platform: ω, then the velocity of its origin, in base axes.
-    by : mapping of str to ndarray (N, k, w)
-        Derivative to each argument of `predict` that the kind depends on, by its name.
-    by_frame : ndarray (N, k, 6) or None
-        Derivative to the pose of the base, counted from the origin; None where there is no frame.
-    by_other : ndarray (N, k, 6) or None
-        Derivative to the twist of the platform at the second place; None where there is none.
-    """
-
-    values: FloatArray
-    by_twist: FloatArray
-    by: Mapping[str, FloatArray] = field(default_factory=dict)
-    by_frame: FloatArray | None = None
-    by_other: FloatArray | None = None
 
 
 class Family(NamedTuple):
@@ -85,63 +58,8 @@ class Family(NamedTuple):
 
     @property
     def noun(self) -> str:
-        """What they are called."""
+        """Noun for these readings."""
         return {"mm": "lengths", "rad": "angles"}.get(self.unit, f"readings in {self.unit}")
-
-
-def joined(parts: Sequence[Predicted], rows_of: Sequence[IntArray]) -> Predicted:
-    """Readings of one kind whose rows stand in several parts: in which rows each part's are."""
-    if len(parts) == 1:
-        return parts[0]
-    count = sum(map(len, rows_of))
-
-    def whole(of_parts: Sequence[FloatArray]) -> FloatArray:
-        found = np.empty((count, *of_parts[0].shape[1:]))
-        for values, mine in zip(of_parts, rows_of, strict=True):
-            found[mine] = values
-        return found
-
-    numbers = {
-        name: whole([vars(part)[name] for part in parts])
-        for name, values in vars(parts[0]).items()
-        if isinstance(values, np.ndarray)
-    }
-    by = {name: whole([part.by[name] for part in parts]) for name in parts[0].by}
-    return Predicted(**numbers, by=by)
-
-
-@dataclass(frozen=True, eq=False)
-class At:
-    """Where a machine is when something is read.
-
-    Attributes
-    ----------
-    pose : ndarray (N, 6)
-        Of the platform in the base frame, mm and rad.
-    other : ndarray (N, 6) or None
-        At the second place.
-    frame, origin : ndarray (6,)
-        Pose of the base in the instrument's frame, counted from `origin`; None: they are one.
-    axis : ndarray of int (N,) or None
-        Of touched lines and planes, which axis of its own each row's has.
-    machines : callable or None
-        Gives pairs of a machine and its rows; for what the pose alone does not determine.
-    measured : Measurements or None
-        The rows.
-    """
-
-    pose: FloatArray
-    other: FloatArray | None = None
-    frame: FloatArray | None = None
-    origin: FloatArray = field(default_factory=lambda: NOWHERE)
-    axis: IntArray | None = None
-    machines: Callable[[], Iterator[tuple[Any, IntArray]]] | None = None
-    measured: Measured | None = None
-
-    def of_rows(self) -> tuple[Measured, Iterator[tuple[Any, IntArray]]]:
-        """The rows and their machines, for a reading that needs both."""
-        assert self.measured is not None and self.machines is not None
-        return self.measured, self.machines()
 
 
 class Reading:
@@ -267,7 +185,7 @@ class Reading:
         return m.values
 
     def follows_pose(self, machine: Any) -> bool:
-        """Whether it follows from one pose of the platform, wherever the actuators are."""
+        """Return whether it follows from one pose of the platform, wherever the actuators are."""
         return True
 
     def arguments(self, m: Measured) -> dict[str, FloatArray]:
@@ -284,7 +202,9 @@ class Reading:
     def simulated(self, m: Measured, solve: Solve) -> FloatArray:
         """Compute what the instrument would read without noise, (N, k)."""
         at = At(solve(m.actuators, "q").pose, axis=np.full(len(m), 2))
-        return self.predict(at, **self.arguments(m)).values
+        found = self.predict(at, **self.arguments(m))
+        require_predicted(self.name, len(self.components), len(m), found)
+        return found.values
 
     def doubts(self, m: Measured) -> Iterator[str]:
         """Say what the readings themselves show to be wrong with them, a sentence each."""
@@ -307,7 +227,7 @@ class Reading:
         return values
 
     def by_difference(self, derivative: FloatArray, residual: FloatArray) -> FloatArray:
-        """How `difference` shrinks, (N, k, n), in the place of a derivative of `Predicted`."""
+        """Return how `difference` shrinks, (N, k, n), for a derivative of `Predicted`."""
         if (first := self.turning) is not None:
             for part in lots(len(residual)):
                 by_turning = orientation.by_turning(residual[part, first:])
@@ -322,7 +242,7 @@ class Reading:
         return tuple(unit for _, unit in self.components)
 
     def mm(self, m: Measured, length: float) -> FloatArray:
-        """What one unit of each component is in mm at the machine, (k,) or (N, k).
+        """Return the worth of one unit of each component at the machine, mm, (k,) or (N, k).
 
         Raises
         ------
@@ -339,19 +259,19 @@ class Reading:
 
     @property
     def families(self) -> tuple[Family, ...]:
-        """Its components by their unit: what may be wrong by itself, lengths or angles, say."""
+        """Return the components by unit: lengths or angles, say, may be wrong by themselves."""
         return tuple(
             Family(unit, tuple(k for k, each in enumerate(self.units) if each == unit))
             for unit in dict.fromkeys(self.units)
         )
 
     def arcs(self, m: Measured, length: float) -> FloatArray:
-        """What takes a residual of each component to mm (k,): one number for all rows."""
+        """Return factors from each component's residual to mm (k,): one number for all rows."""
         each = self.mm(m, length)
         return np.asarray(np.median(each, axis=0) if each.ndim > 1 else each, dtype=np.float64)
 
     def distance_per_point(self, residual: FloatArray, m: Measured, length: float) -> FloatArray:
-        """How far off each measured point is, mm (N,); angles count as their arc."""
+        """Return the distance of each measured point, mm (N,); angles count as their arc."""
         if self.units:
             residual = residual * self.mm(m, length)
         off: FloatArray = np.linalg.norm(residual, axis=1)
@@ -408,7 +328,7 @@ class Reading:
         return self.with_fields({name: defaults[name] for name in self.truth})
 
     def subject(self, rows: int) -> IntArray:
-        """Which of several things each of `rows` rows is of beside its target, (N,), from 0.
+        """Return the subject of each of `rows` rows beside its target, (N,), from 0.
 
         Rows differ where a field with an entry for every row does, a second place, an attachment:
         they repeat no other then.
@@ -432,7 +352,7 @@ class Reading:
         return dataclasses.replace(self, **changes)  # type: ignore[type-var]
 
     def approached(self, actuators: FloatArray, first: FloatArray | None) -> FloatArray | None:
-        """From where actuators (N, n) came to the second place of each row, (N, n).
+        """Return the approach of actuators (N, n) to the second place of each row, (N, n).
 
         `first` is from where they came to the first; None: not known.
         """
@@ -441,12 +361,12 @@ class Reading:
     # words ----------------------------------------------------------------------------------------
 
     def noun(self, count: int = 2) -> str:
-        """What one, or several, are called."""
+        """Return the noun for one, or for several."""
         one, several = self.nouns or (self.name, f"{self.name}s")
         return one if count == 1 else several
 
     def title(self, m: Measured) -> str:
-        """How many of what they are."""
+        """Return a title: how many readings of which noun, and how many are missing."""
         what = f"{len(m)} measured {self.noun(len(m))}"
         missing = int(np.isnan(m.values.reshape(len(m), -1)).all(axis=1).sum())
         return what + (f" ({missing} not read)" if missing else "")
@@ -488,6 +408,6 @@ class Reading:
         return self.columns(units)
 
     def points(self, m: Measured) -> dict[str, FloatArray]:
-        """Its own points of every row (N, 3), mm, as far as they are stated, by name."""
+        """Return the reading's own points of every row (N, 3), mm, as far as stated, by name."""
         own = {name: getattr(self, name) for name in self.own_points}
         return {name: m.of_points(place) for name, place in own.items() if place is not None}

@@ -34,7 +34,7 @@ _TILTED = np.radians(5.0)  # between pictures, of a board that is tilted enough 
 
 
 class Picture(NamedTuple):
-    """One picture and what is in it.
+    """A picture and its corners.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class Picture(NamedTuple):
 
 @dataclass(frozen=True, repr=False)
 class Detection(Result):
-    """What of a board pictures show.
+    """Corners of a board in pictures.
 
     Attributes
     ----------
@@ -87,7 +87,7 @@ class Detection(Result):
 
     @property
     def image(self) -> IntArray:
-        """Which of `taken` each corner is in, (N,)."""
+        """Picture of each corner, as a place in `taken`, (N,)."""
         return np.repeat(np.arange(len(self.taken)), [len(each.seen.ids) for each in self.taken])
 
     @property
@@ -97,7 +97,7 @@ class Detection(Result):
 
     @property
     def pixel(self) -> FloatArray:
-        """Where it is, (N, 2), px."""
+        """Place of each corner, (N, 2), px."""
         return np.concatenate([np.empty((0, 2)), *(each.seen.pixel for each in self.taken)])
 
     def write(self, path: str | PathLike[str], comment: str = "") -> None:
@@ -266,7 +266,7 @@ def _picture(path: Path, grey: Any, finds: Finder) -> Picture:
 
 
 def _contrast(grey: Any, pixel: FloatArray) -> float:
-    """How much grey levels differ from pixel to pixel next to corners, the median of the most."""
+    """Return the contrast next to corners, pixel to pixel, the median of the largest."""
     height, width = grey.shape
     steepest = []
     for u, v in pixel.round().astype(int):
@@ -355,7 +355,7 @@ def _sharp(pictures: list[Picture]) -> list[Picture]:
 
 
 def _remarks(found: Detection, board: Board, tilts: FloatArray, finds: Finder) -> Iterator[str]:
-    """What should be known of all pictures together."""
+    """List remarks on all pictures together."""
     if not found.taken:
         if _seen_in_a_mirror(found.pictures, finds):
             yield (
@@ -398,7 +398,7 @@ def _area(pixel: FloatArray) -> float:
 
 
 def _seen_in_a_mirror(pictures: Sequence[Picture], finds: Finder) -> bool:
-    """Whether the first picture that shows no board shows one from behind."""
+    """Return whether the first picture that shows no board shows one from behind."""
     for each in pictures:
         if each.bad.startswith("no board"):
             grey = _grey(each.path, each.path.read_bytes())

@@ -1,0 +1,116 @@
+"""Where a machine is when something is read, and what should be read there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from pkmcal.arguments import kind
+from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.exceptions import ArgumentError, ArgumentTypeError
+from pkmcal.readings.measured import Measured
+
+NOWHERE = np.zeros(6)
+
+
+@dataclass(frozen=True, eq=False)
+class At:
+    """Where a machine is when something is read.
+
+    Attributes
+    ----------
+    pose : ndarray (N, 6)
+        Of the platform in the base frame, mm and rad.
+    other : ndarray (N, 6) or None
+        At the second place.
+    frame, origin : ndarray (6,)
+        Pose of the base in the instrument's frame, counted from `origin`; None: they are one.
+    axis : ndarray of int (N,) or None
+        Of touched lines and planes, which axis of its own each row's has.
+    machines : callable or None
+        Gives pairs of a machine and its rows; for what the pose alone does not determine.
+    measured : Measurements or None
+        The rows.
+    """
+
+    pose: FloatArray
+    other: FloatArray | None = None
+    frame: FloatArray | None = None
+    origin: FloatArray = field(default_factory=lambda: NOWHERE)
+    axis: IntArray | None = None
+    machines: Callable[[], Iterator[tuple[Any, IntArray]]] | None = None
+    measured: Measured | None = None
+
+    def of_rows(self) -> tuple[Measured, Iterator[tuple[Any, IntArray]]]:
+        """The rows and their machines, for a reading that needs both."""
+        assert self.measured is not None and self.machines is not None
+        return self.measured, self.machines()
+
+
+@dataclass(frozen=True)
+class Predicted:
+    """Readings of one kind and their derivatives.
+
+    Attributes
+    ----------
+    values : ndarray (N, k)
+        In the units of the components. Derivatives of the three angles of orientations are those
+        of the turning in the instrument's axes.
+    by_twist : ndarray (N, k, 6)
+        Derivative to the twist of the platform: ω, then the velocity of its origin, in base axes.
+    by : mapping of str to ndarray (N, k, w)
+        Derivative to each argument of `predict` that the kind depends on, by its name.
+    by_frame : ndarray (N, k, 6) or None
+        Derivative to the pose of the base, counted from the origin; None where there is no frame.
+    by_other : ndarray (N, k, 6) or None
+        Derivative to the twist of the platform at the second place; None where there is none.
+    """
+
+    values: FloatArray
+    by_twist: FloatArray
+    by: Mapping[str, FloatArray] = field(default_factory=dict)
+    by_frame: FloatArray | None = None
+    by_other: FloatArray | None = None
+
+
+def require_shape(what: str, found: object, shape: tuple[int, ...]) -> None:
+    """Refuse what a class of the user's own returned if it is no array of this shape."""
+    if not isinstance(found, np.ndarray) or found.shape != shape:
+        seen = found.shape if isinstance(found, np.ndarray) else kind(found)
+        raise ArgumentError(f"{what} must be an array of shape {shape}; found {seen}")
+
+
+def require_predicted(name: str, components: int, rows: int, found: object) -> None:
+    """Refuse what `predict` of a kind returned without values (N, k) or derivatives (N, k, 6)."""
+    what = f"kind: predict of {name!r}"
+    if not isinstance(found, Predicted):
+        raise ArgumentTypeError(f"{what} must return Predicted(…); found {kind(found)}")
+    require_shape(f"{what}: values", found.values, (rows, components))
+    require_shape(f"{what}: by_twist", found.by_twist, (rows, components, 6))
+    for side in ("by_frame", "by_other"):
+        if getattr(found, side) is not None:
+            require_shape(f"{what}: {side}", getattr(found, side), (rows, components, 6))
+
+
+def joined(parts: Sequence[Predicted], rows_of: Sequence[IntArray]) -> Predicted:
+    """Readings of one kind whose rows stand in several parts: in which rows each part's are."""
+    if len(parts) == 1:
+        return parts[0]
+    count = sum(map(len, rows_of))
+
+    def whole(of_parts: Sequence[FloatArray]) -> FloatArray:
+        found = np.empty((count, *of_parts[0].shape[1:]))
+        for values, mine in zip(of_parts, rows_of, strict=True):
+            found[mine] = values
+        return found
+
+    numbers = {
+        name: whole([vars(part)[name] for part in parts])
+        for name, values in vars(parts[0]).items()
+        if isinstance(values, np.ndarray)
+    }
+    by = {name: whole([part.by[name] for part in parts]) for name in parts[0].by}
+    return Predicted(**numbers, by=by)
