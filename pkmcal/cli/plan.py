@@ -43,6 +43,22 @@ def plan(
         Path | None,
         typer.Option(metavar="CSV", help="Poses where accuracy counts; by default the candidates."),
     ] = None,
+    direction: Annotated[
+        str | None,
+        typer.Option(
+            metavar="X,Y,Z",
+            help="In which direction of the base the error counts: z, of a printer's nozzle over"
+            " its bed. By default in all.",
+        ),
+    ] = None,
+    measured: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="CSV",
+            help="Rows that are there: the plan is for poses beside them. Without a column sigma"
+            " they have --noise.",
+        ),
+    ] = None,
     criterion: Annotated[
         str, typer.Option(metavar="WORD", help="prediction, D or A: what is minimised.")
     ] = "prediction",

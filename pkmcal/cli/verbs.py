@@ -23,6 +23,7 @@ _VERBS = {  # where each is: file and function
     "sensitivity": "sensitivity.sensitivity",
     "tolerance": "tolerance.tolerance",
     "plan": "plan.plan",
+    "measure": "measure.measure",
     "board": "board.board",
     "detect": "detect.detect",
     "calibrate": "calibrate.calibrate",

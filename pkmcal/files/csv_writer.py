@@ -82,9 +82,11 @@ def write_csv(
     OSError
         The file cannot be written; one that was there before is untouched.
     """
+    write_whole(path, arguments.comment(comment) + lines_of([headings, *rows]))
+
+
+def lines_of(rows: Iterable[Iterable[str]]) -> str:
+    """Lines of a CSV file, each with its end."""
     text = io.StringIO()
-    text.write(arguments.comment(comment))
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(headings)
-    writer.writerows(rows)
-    write_whole(path, text.getvalue())
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue()

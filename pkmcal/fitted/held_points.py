@@ -299,6 +299,8 @@ def _test(
     if not (own > _NOTHING * np.median(own)).all():
         return None
     fitted, split = _fitted(uncertainty, points.like[good], points.family[good])
+    if not split[0] > 0.0:  # as many equations as parameters: all are met exactly
+        return None
     unit = np.sqrt(own)
     whole, covariance = points.whole(uncertainty)
     beside = ((0, 0), (0, points.considered.shape[1]))  # no part of the fit

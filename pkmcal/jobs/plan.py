@@ -28,6 +28,8 @@ class Planning(OfMachine):
     accuracy: float | None = None
     poses: PathText | None = None
     targets: PathText | None = None
+    direction: str | None = None
+    measured: PathText | None = None
     criterion: str = "prediction"
     kind: str = "position"
     target: tuple[str, ...] = ()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -29,9 +29,13 @@ from pkmcal.kinematics.robot import Robot
 from pkmcal.kinematics.workspace import good_poses, sample_poses
 from pkmcal.loading import load
 from pkmcal.measurements.command_csv import read_commands, write_commands
+from pkmcal.measurements.measurement_csv import read_measurements
+from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.pose_csv import read_poses, write_poses
+from pkmcal.measurements.virtual_machine import VirtualMachine
+from pkmcal.planning.offered import PLANNED
 from pkmcal.planning.optimal_design import CRITERIA
-from pkmcal.planning.plan_poses import PLANNED, Plan, plan_poses
+from pkmcal.planning.plan_poses import Plan, plan_poses
 from pkmcal.planning.planned import UNKNOWN
 from pkmcal.readings.registry import Kind
 
@@ -50,11 +54,14 @@ class Sources:
         The machine, within where it is to stay.
     poses, targets : ndarray or None
         Candidates, and poses where accuracy counts, of files: (N, 6), or an arm's joints (N, n).
+    measured : Measurements or None
+        Rows that are there.
     """
 
     robot: Robot | SerialArm
     poses: FloatArray | None
     targets: FloatArray | None
+    measured: Measurements | None = None
 
 
 def run(job: Planning, inputs: Inputs) -> Plan:
@@ -83,38 +90,89 @@ def read(job: Planning, inputs: Inputs) -> Sources:
         robot = yielding(robot.within(box), job.compliance)
     poses = None if job.poses is None else _places(robot, inputs.file(job.poses))
     targets = None if job.targets is None else _places(robot, inputs.file(job.targets))
-    return Sources(robot, poses, targets)
+    measured = None
+    if job.measured is not None:
+        measured = read_measurements(inputs.file(job.measured), as_machine(robot))
+        if measured.sigma is None and measured.components:
+            noise = _noise(job.noise, kinds_of(job))
+            of_kind = noise.get(measured.kind) if isinstance(noise, dict) else noise
+            if of_kind is None:
+                raise ArgumentError(
+                    f"--measured: its rows of kind {measured.kind} have no sigma, and --noise says"
+                    " none of them"
+                )
+            sigma = VirtualMachine(robot, of_kind).deviations(measured.units)
+            measured = replace(measured, sigma=sigma)
+    return Sources(robot, poses, targets, measured)
 
 
 def planned(job: Planning, sources: Sources) -> Plan:
     """Choose the poses of a plan whose files have been read."""
-    machine = sources.robot
-    seen = as_machine(machine)
+    several = isinstance(kinds_of(job), dict)
+    payloads = [] if job.payloads is None else job.payloads.split(",")
+    return plan_poses(
+        sources.robot,
+        candidates(job, sources),
+        count=30 if job.count is None and job.accuracy is None and not several else job.count,
+        accuracy=job.accuracy,
+        travel_weight=job.travel_weight,
+        payloads=[mass("--payloads", each) for each in payloads],
+        measured=sources.measured,
+        **options(job, sources),
+    )
+
+
+def options(job: Planning, sources: Sources) -> dict[str, Any]:
+    """What plans and the choice of a next pose take alike, beside machine and candidates.
+
+    Raises
+    ------
+    ValueError
+        An option that says nothing of this machine, or of what is measured.
+    """
+    seen = as_machine(sources.robot)
     free = free_names(seen, job.free)
     kinds = kinds_of(job)
-    several = isinstance(kinds, dict)
     pictures = planned_camera(job) if kinds == "pixel" else None
     if pictures is None and (job.camera is not None or job.board is not None):
         raise ArgumentError("--camera, --board: they are of pictures; state --kind pixel")
-    payloads = [] if job.payloads is None else job.payloads.split(",")
-    return plan_poses(
-        machine,
-        _candidates(job, machine) if sources.poses is None else sources.poses,
-        count=30 if job.count is None and job.accuracy is None and not several else job.count,
-        accuracy=job.accuracy,
-        targets=sources.targets,
-        criterion=word("--criterion", job.criterion, CRITERIA),
-        kind=kinds if pictures is None else pictures,
-        target=_points(job.target, kinds),
-        noise=_noise(job.noise, kinds),
-        actuator_noise=job.actuator_noise,
-        travel_weight=job.travel_weight,
-        payloads=[mass("--payloads", each) for each in payloads],
-        effects=_effects(job.effects or ["none"]),
-        free=free or None,
-        prior=read_prior(job.prior, seen, free),
-        unknown=[word("--unknown", each, UNKNOWN) for each in job.unknown],
-    )
+    return {
+        "targets": sources.targets,
+        "criterion": word("--criterion", job.criterion, CRITERIA),
+        "kind": kinds if pictures is None else pictures,
+        "target": _points(job.target, kinds),
+        "noise": _noise(job.noise, kinds),
+        "actuator_noise": job.actuator_noise,
+        "effects": _effects(job.effects or ["none"]),
+        "free": free or None,
+        "prior": read_prior(job.prior, seen, free),
+        "unknown": [word("--unknown", each, UNKNOWN) for each in job.unknown],
+        "direction": None if job.direction is None else axis(job.direction),
+    }
+
+
+def candidates(job: Planning, sources: Sources) -> FloatArray:
+    """Poses to choose from."""
+    return _candidates(job, sources.robot) if sources.poses is None else sources.poses
+
+
+def axis(text: str) -> list[float]:
+    """What ``--direction`` states: x, y or z of the base, or three numbers.
+
+    Raises
+    ------
+    ValueError
+        Something else.
+    """
+    if text in ("x", "y", "z"):
+        return [float(text == each) for each in "xyz"]
+    try:
+        found = [typed(each) for each in text.split(",")]
+    except ValueError:
+        found = []
+    if len(found) != 3:
+        raise ArgumentError(f"--direction {text}: expected x, y or z, or X,Y,Z")
+    return found
 
 
 def files(job: Planning) -> list[str]:

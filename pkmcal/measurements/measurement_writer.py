@@ -38,10 +38,18 @@ def write_measurements(
     OSError
         The file cannot be written; one that was there before is untouched.
     """
+    headings, cells = headed_cells(measurements, reading)
+    write_csv(path, headings, cells, comment=comment)
+
+
+def headed_cells(
+    measurements: Any, reading: Sequence[str] | None = None
+) -> tuple[list[str], list[tuple[str, ...]]]:
+    """Headings and the cells of each row, as `write_measurements` writes them."""
     own = measurements.actuator_units or ("mm",) * measurements.actuators.shape[1]
     columns = list(_columns(measurements, reading or own))
-    cells = zip(*(column.cells() for column in columns), strict=True)
-    write_csv(path, [column.heading for column in columns], cells, comment=comment)
+    cells = list(zip(*(column.cells() for column in columns), strict=True))
+    return [column.heading for column in columns], cells
 
 
 def _columns(m: Any, units: Sequence[str]) -> Iterator[WrittenColumn]:

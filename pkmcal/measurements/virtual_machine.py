@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -159,9 +160,21 @@ class VirtualMachine:
                 raise ArgumentError(f"kind: a tracker measures positions, found {blank.kind!r}")
             covariance = self.noise.covariance(exact)
             return (np.linalg.cholesky(covariance) @ drawn[:, :, None])[:, :, 0], self.noise
-        deviations = {"rad": self.angle_noise}  # every other unit: the instrument's noise
-        sigma = np.array([deviations.get(unit, self.noise) for unit in blank.units])
+        sigma = self.deviations(blank.units)
         return sigma * drawn, sigma if len(sigma) and (sigma > 0).all() else None
+
+    def deviations(self, units: Sequence[str]) -> FloatArray:
+        """Deviation of each component of a reading, by its unit.
+
+        Raises
+        ------
+        ValueError
+            A tracker's follow from where it points.
+        """
+        if isinstance(self.noise, Tracker):
+            raise ArgumentError("noise: that of a tracker follows from where it points")
+        of_unit = {"rad": self.angle_noise}  # every other unit: the instrument's noise
+        return np.array([of_unit.get(unit, self.noise) for unit in units])
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ starts more than once and keeps the best.
 
 from __future__ import annotations
 
+import copy
 import itertools
 from collections.abc import Iterator, Sequence
 from typing import Literal
@@ -144,6 +145,26 @@ class Design:
                 chosen.append(next(growing))
             found.append(self._reduced(chosen, error))
         return min(found, key=len)
+
+    def beside(self, candidate: int) -> Design:
+        """The design where what this candidate brings is there, whatever is chosen."""
+        made = copy.copy(self)
+        block = self._blocks[candidate]
+        made._prior = self._prior + block.T @ block
+        return made
+
+    def fewest(self) -> int:
+        """How many candidates it takes at least to identify what those that are there do not."""
+        nothing = np.array([], dtype=np.intp)
+        information = np.linalg.eigvalsh(self._information(nothing))
+        lacking = int((information < _NOTHING).sum())
+        return -(-lacking // int(self._blocks.shape[1]))
+
+    def best(self, allowed: BoolArray) -> int:
+        """The candidate that helps most, of those that are allowed (N,)."""
+        gains = self._gains([], self._lacking([]), self._all)
+        gains[~allowed] = -np.inf
+        return first_largest(gains, _ALIKE * gains.max())
 
     def exchanged_for(self, chosen: IntArray, member: int) -> FloatArray:
         """Return the criterion with each candidate (N,) in place of a member.

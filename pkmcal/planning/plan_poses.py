@@ -9,49 +9,27 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pkmcal.arguments import number, whole, word, words
+from pkmcal.arguments import number, whole, word
 from pkmcal.arms.arm import SerialArm
-from pkmcal.arrays import BoolArray, FloatArray, IntArray, as_rows, mm_per_unit
+from pkmcal.arrays import FloatArray, IntArray, mm_per_unit
 from pkmcal.core.library import POSE
 from pkmcal.display import Table, fixed
 from pkmcal.effects.effect import Effects
-from pkmcal.effects.stated import effects_on
-from pkmcal.estimation.parameters import Parameters, Prior
-from pkmcal.exceptions import ArgumentError, ArgumentTypeError
+from pkmcal.estimation.parameters import Prior
+from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.carried import Load
-from pkmcal.kinematics.calibratable import Calibratable, as_machine
-from pkmcal.kinematics.perturbed import ideal
-from pkmcal.kinematics.pulled import pulled
+from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.tracker import Tracker
+from pkmcal.planning.offered import Planned, along, known_kind, name_of, offered
 from pkmcal.planning.optimal_design import CRITERIA, Criterion
-from pkmcal.planning.planned import (
-    Unknown,
-    as_measured,
-    brought,
-    design_of,
-    equations_of,
-    information,
-    planned,
-    read_at,
-    stated_loads,
-    together,
-    under,
-)
+from pkmcal.planning.planned import Unknown
 from pkmcal.planning.tour import short_tour, tour_length
 from pkmcal.planning.travel_weight import with_travel
-from pkmcal.readings.reading import Reading
-from pkmcal.readings.registry import KINDS, Kind, as_reading
 from pkmcal.result import Result
 
-Planned = Kind | Reading
-PLANNED: tuple[Kind, ...] = tuple(each for each, of in KINDS.items() if of.planned)
-
 _DRAWS = 25  # of poses at random, to compare a plan with
-_ERROR = 0.5  # mm; what numbers may be off by that have no prior
-_TIMES, _MACHINES = 2.0, 16  # so many machines with so many times these errors must get there
-_FOUND = 1e-6  # mm, rad: how near to a pose forward kinematics must end
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -124,6 +102,8 @@ class Plan(Result):
     unpulled: int = 0
     stderr: FloatArray = field(default_factory=lambda: np.empty(0))
     load: Load | None = None
+    direction: FloatArray | None = None
+    dilution: float = float("nan")
 
     def __len__(self) -> int:
         return len(self.indices)
@@ -155,10 +135,15 @@ class Plan(Result):
             rows = [[*row, f"{mass:g}"] for row, mass in zip(rows, masses, strict=True)]
         yield f"{self.robot.name}: measure {count} for {len(self.parameters)} parameters{left_out}"
         yield (
-            f"predicted error {self.predicted:.3g} mm rms; {count} at random"
-            f" {self.at_random:.3g}, all candidates {self.all_candidates:.3g};"
+            f"predicted error{along(self.direction)} {self.predicted:.3g} mm rms;"
+            f" {count} at random {self.at_random:.3g}, all candidates {self.all_candidates:.3g};"
             f" a tour of {_way(self.travel)} mm"
         )
+        if np.isfinite(self.dilution):
+            yield (
+                f"dilution {self.dilution:.2g}: so many times the noise of a reading arrives at the"
+                " targets, whatever the errors of the machine"
+            )
         if self.travel_weight:
             yield (
                 f"travel weight {self.travel_weight:g}; without it"
@@ -194,6 +179,7 @@ def plan_poses(
     payloads: Sequence[float | Load] = (),
     effects: Effects = (),
     measured: Measurements | None = None,
+    direction: ArrayLike | None = None,
 ) -> Plan:
     """Choose poses to measure among candidates, by exchange.
 
@@ -253,6 +239,9 @@ def plan_poses(
     measured : Measurements, optional
         Rows that are there, with their sigma: the plan is for poses beside them, `count` more, or
         as many as lead to `accuracy`, none if they do. Read in the same frame as those to come.
+    direction : array_like (3,), optional
+        In which direction of the base the error counts at the targets: ``(0, 0, 1)`` of a printer
+        that needs its height over the bed. By default all three count.
 
     Returns
     -------
@@ -279,43 +268,27 @@ def plan_poses(
     (20, True)
     """
     word("criterion", criterion, CRITERIA)
-    machine = as_machine(robot)
-    machine, others, of_effects = effects_on(machine, effects)
-    if others:
-        raise ArgumentError(f"effects: {others[0].name} follows rows, which a plan has not yet")
-    loads = stated_loads(machine, payloads)
     counts = _counts(kind, count, accuracy)
     kinds = list(counts)
-    poses, q, inside, offered, unpulled = _within_limits(machine, candidates, loads)
-    mounted = not all(as_reading(each).placed for each in kinds)
-    able = read_at(machine, q, kinds)
-    if not able.any():
-        raise ArgumentError(
-            f"candidates: at none of {len(q)} is the whole board in the picture: offer"
-            " poses at which it is before the camera (--poses, --within)"
-        )
-    poses, q, inside = poses[able], q[able], inside[able]
-    aims = (poses, q) if targets is None else _aims(machine, targets)
-    distinct, place = np.unique(q, axis=0, return_inverse=True)
-    stated = {each: _of("target", target, each, kinds) for each in kinds}
-    points = {k: as_rows("target", given, 3)[0] for k, given in stated.items() if given is not None}
-    sets = [
-        planned(machine, distinct, each, points.get(each), _of("noise", noise, each, kinds),
-                actuator_noise, load)
-        for each in kinds for load in loads
-    ]  # fmt: skip
-    before = [] if measured is None else [_before(machine, measured, unknown)]
-    equations = equations_of(machine, [*sets, *before], free, prior, unknown, of_effects)
-    equations, of_before = equations[: len(sets)], equations[len(sets) :]
-    there = brought(of_before) if of_before else None
-    parameters = equations[0].parameters
-    safe = _safe(parameters, poses, q)
-    rows = place.reshape(-1)[safe]
-    blocks = together([information(each, len(distinct))[rows] for each in equations])
-    sort = np.repeat(np.arange(len(kinds)), len(loads) * len(rows))
-    design, own_frame = design_of(parameters, blocks, sort, *aims, criterion, loads, mounted, there)
-    poses, q, inside = poses[safe], q[safe], inside[safe]
-    everything = design.predicted(np.arange(len(blocks)))
+    choice = offered(
+        robot,
+        candidates,
+        kinds,
+        targets=targets,
+        direction=direction,
+        criterion=criterion,
+        target=target,
+        noise=noise,
+        free=free,
+        prior=prior,
+        unknown=unknown,
+        actuator_noise=actuator_noise,
+        payloads=payloads,
+        effects=effects,
+        measured=measured,
+    )
+    design, loads, q = choice.design, choice.loads, choice.actuators
+    everything = design.predicted(np.arange(len(choice.sort)))
     if everything == 0.0 and (criterion == "prediction" or accuracy is not None):
         raise ArgumentError(
             f"{'criterion' if accuracy is None else 'accuracy'}: nothing that is free moves the"
@@ -330,7 +303,7 @@ def plan_poses(
         found = design.grown(*each)
     else:
         found = design.reaching(_accuracy(accuracy, everything, len(q)))
-    ways, home = _drives(machine, q)
+    ways, home = _drives(choice.machine, q)
     places, start = _by_payload(ways, home, len(kinds), len(loads))
     if len(found):
         found = found[short_tour(places[found], start)[0]]
@@ -339,37 +312,30 @@ def plan_poses(
         least = np.inf if accuracy is None else max(accuracy, unweighted[0])
         found = with_travel(design, found, places, start, weight, least)[0]
     chosen = found % len(q)
+    predicted = design.predicted(found)
     return Plan(
         robot=robot,
-        indices=inside[chosen],
-        poses=poses[chosen],
+        indices=choice.indices[chosen],
+        poses=choice.poses[chosen],
         actuators=q[chosen],
-        predicted=design.predicted(found),
+        predicted=predicted,
         at_random=design.at_random(found, _DRAWS),
         all_candidates=everything,
-        left_out=offered - len(inside),
-        parameters=parameters.names,
+        left_out=choice.given - len(choice.indices),
+        parameters=choice.parameters.names,
         travel=tour_length(np.vstack([home, ways[chosen]])),
-        own_frame=own_frame,
-        kinds=tuple(_name(kinds[sort[i]]) for i in found),
-        target={_name(each): place for each, place in points.items()},
+        own_frame=choice.own_frame,
+        kinds=tuple(name_of(kinds[choice.sort[i]]) for i in found),
+        target={name_of(each): place for each, place in choice.points.items()},
         travel_weight=weight,
         predicted_unweighted=unweighted[0],
         travel_unweighted=unweighted[1],
-        unpulled=unpulled,
-        stderr=design.deviations(found) * parameters.scale,
+        unpulled=choice.unpulled,
+        stderr=design.deviations(found) * choice.parameters.scale,
         load=_carried(loads, found // len(q) % len(loads)),
+        direction=None if direction is None else np.asarray(direction, dtype=np.float64),
+        dilution=predicted / choice.noise,
     )
-
-
-def _before(
-    machine: Calibratable, measured: Measurements, unknown: Unknown | Sequence[Unknown]
-) -> Measurements:
-    if not isinstance(measured, Measurements):
-        raise ArgumentTypeError(f"measured must be Measurements, found {measured!r}")
-    if "target" in words("unknown", unknown):
-        raise ArgumentError("measured, unknown: rows that are there need a target that is known")
-    return as_measured(machine, measured)
 
 
 def _counts(
@@ -382,20 +348,12 @@ def _counts(
                 "kind: a mapping says how many poses of each kind, and goes without count and"
                 f" accuracy; found {kind!r}"
             )
-        return {_known(each): n for each, n in kind.items()}
+        return {known_kind(each): n for each, n in kind.items()}
     if (count is None) == (accuracy is None):
         raise ArgumentError(
             "give either count, how many poses, or accuracy, the error wanted in mm"
         )
-    return {_known(kind): count}  # type: ignore[dict-item]
-
-
-def _known(kind: Planned) -> Planned:
-    return kind if isinstance(kind, Reading) else word("kind", kind, PLANNED)
-
-
-def _name(kind: Planned) -> str:
-    return as_reading(kind).name
+    return {known_kind(kind): count}  # type: ignore[dict-item]
 
 
 def _weight(given: object, accuracy: object, criterion: Criterion) -> float:
@@ -405,20 +363,6 @@ def _weight(given: object, accuracy: object, criterion: Criterion) -> float:
             f"travel_weight: with accuracy it goes with the criterion prediction, found {criterion}"
         )
     return weight
-
-
-def _of(name: str, given: Any, kind: Planned, kinds: Sequence[Planned]) -> Any:
-    """Return the value given for one kind: one for all, or by kind."""
-    if not isinstance(given, Mapping):
-        return given
-    for each in given:
-        if each not in kinds:
-            raise ArgumentError(
-                f"{name}: the plan has {', '.join(map(_name, kinds))}; found {each!r}"
-            )
-    if not given or (kind not in given and name == "noise"):
-        raise ArgumentError(f"{name}: of {_name(kind)} not stated; found {given!r}")
-    return given.get(kind)
 
 
 def _drives(robot: Calibratable, q: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -461,70 +405,6 @@ def _loaded(robot: Robot | SerialArm) -> bool:
 
 def _poses(count: int) -> str:
     return f"{count} pose{'s' * (count != 1)}"
-
-
-def _commanded(name: str, robot: Calibratable, places: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Poses and actuators of poses, or of an arm's joint coordinates; NaN where there are none."""
-    if isinstance(robot, Robot):
-        there, q, _ = ideal(robot, as_rows(name, places, 6)[0])
-    else:
-        there, q, _ = robot.commanded(as_rows(name, places, robot.n_actuators)[0])
-    return there, q
-
-
-def _aims(robot: Calibratable, targets: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    there, q = _commanded("targets", robot, targets)
-    unreached = np.flatnonzero(~np.isfinite(there).all(axis=1))
-    if len(unreached):
-        raise ArgumentError(f"targets: {robot.name} has no such pose (row {unreached[0]})")
-    return there, q
-
-
-def _within_limits(
-    robot: Calibratable, candidates: ArrayLike, loads: Sequence[Load | None]
-) -> tuple[FloatArray, FloatArray, IntArray, int, int]:
-    """Poses and actuators of the candidates that can be measured, which ones, and of how many.
-
-    Last, at how many within limits some cable would have to push.
-    """
-    there, q = _commanded("candidates", robot, candidates)
-    good = np.asarray(np.isfinite(there).all(axis=1))
-    unpulled = 0
-    if isinstance(robot, Robot):  # the file of an arm has no limits
-        good[good] = robot.feasible(there[good]).ok
-        held = pulled(robot, there[good])
-        unpulled = int((~held).sum())
-        good[good] = held
-    # `identify` starts from home, too, and must find them
-    good[good] = np.abs(robot.forward(q[good]).pose - there[good]).max(axis=1) < _FOUND
-    for load in loads:
-        if load is not None:  # beside a singularity a machine gives way
-            good[good] = under(robot, load).forward(q[good]).ok
-    inside = np.flatnonzero(good)
-    if not len(inside):
-        raise ArgumentError(
-            f"candidates: none of {len(there)} is within the limits of {robot.name}"
-            + (f"; at {unpulled} some cable would have to push" if unpulled else "")
-        )
-    return there[inside], q[inside], inside, len(there), unpulled
-
-
-def _safe(chosen: Parameters, poses: FloatArray, q: FloatArray) -> BoolArray:
-    """Mark candidates that machines with errors reach, too: none beside a singularity."""
-    k = len(chosen.places)
-    sigma = np.minimum(chosen.prior, _ERROR * chosen.scale)[:k]
-    random, values = np.random.default_rng(0), chosen.robot.geometry.values
-    safe = np.ones(len(q), dtype=bool)
-    for _ in range(_MACHINES):
-        erroneous = values.copy()
-        erroneous[chosen.places] += _TIMES * sigma * random.standard_normal(k)
-        machine = chosen.robot.with_values(erroneous)
-        safe[safe] = machine.forward(q[safe], guess=poses[safe]).ok
-    if not safe.any():
-        raise ArgumentError(
-            "candidates: all are so near a singularity that errors bar the way there"
-        )
-    return safe
 
 
 def _accuracy(accuracy: object, best: float, candidates: int) -> float:

@@ -252,11 +252,13 @@ def design_of(
     loads: Sequence[Load | None] = (None,),
     mounted: bool = False,
     there: FloatArray | None = None,
+    direction: FloatArray | None = None,
 ) -> tuple[Design, bool]:
     """The design, and whether its errors, under each load, are in the machine's own frame.
 
     `mounted`: what is on the platform has to be found, so that its frame is the machine's own, too.
-    `there` (p, n) is what rows that are measured already bring.
+    `there` (p, n) is what rows that are measured already bring. Errors count along `direction`
+    (1, 3) alone, where one is stated.
     """
     k = len(chosen.places)
     machines = [under(chosen.robot, load) for load in loads]
@@ -264,6 +266,8 @@ def design_of(
     aims = np.tile(aims, (len(loads), 1))
     by_geometry = twists[:, 3:, chosen.places] * chosen.scale[:k]
     aimed = np.concatenate([by_geometry, np.zeros((len(aims), 3, len(chosen) - k))], axis=2)
+    along = np.eye(3) if direction is None else direction
+    aimed = along @ aimed
     if not np.isfinite(blocks).all() or not np.isfinite(aimed).all():
         raise ArgumentError(
             "candidates or targets: one is singular, where nothing holds the platform"
@@ -281,9 +285,10 @@ def design_of(
         return made, False
     motions = _rigid_motions(aims[:, :3])
     if mounted:  # points of the platform, as far from its origin everywhere
-        turned = orientation.rotations(aims[:, 3:]).reshape(-1, 3)
-        motions = np.hstack([motions, turned])
-    rigid = column_basis(motions)
+        turned = orientation.rotations(aims[:, 3:])
+        motions = np.concatenate([motions, turned], axis=2)
+    motions = along @ motions
+    rigid = column_basis(motions.reshape(-1, motions.shape[2]))
     within = rigid.T @ moved
     if np.abs(moved - rigid @ within).max() <= _UNIDENTIFIABLE * np.abs(moved).max():
         ways, sizes, _ = np.linalg.svd(within)
@@ -299,8 +304,8 @@ def design_of(
 
 
 def _rigid_motions(points: FloatArray) -> FloatArray:
-    """Return rigid motions of points (T, 3), (3 T, 6): shifts, then turns about their middle."""
+    """Return rigid motions of points (T, 3), (T, 3, 6): shifts, then turns about their middle."""
     away = (points - points.mean(axis=0))[:, None]
     turns = np.cross(np.eye(3)[None], away).transpose(0, 2, 1)
     shifts = np.broadcast_to(np.eye(3), turns.shape)
-    return np.concatenate([shifts, turns], axis=2).reshape(-1, 6)
+    return np.concatenate([shifts, turns], axis=2)

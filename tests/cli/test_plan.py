@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -257,3 +258,20 @@ def test_a_shorter_tour_has_its_price(run: Any) -> None:
     )
     assert short["travel"] < 0.8 * plain["travel"] and short["predicted"] > plain["predicted"]
     assert short["travel_unweighted"] == plain["travel"] == plain["travel_unweighted"]
+
+
+def test_a_plan_is_for_poses_beside_rows_of_a_file(run: Any, refused: Any, tmp_path: Path) -> None:
+    robot = pk.load("hexapod")
+    poses = pk.sample_poses(robot, 500, share=0.9)
+    there = pk.VirtualMachine(robot, 0.03, seed=1).measure(robot.inverse(poses[:12]), "pose")
+    there.write(tmp_path / "there.csv")
+    command = ("plan", "hexapod", "--kind", "pose", "--noise", "0.03", "--count", "5")
+    expected = pk.plan_poses(robot, poses, 5, kind="pose", noise=0.03, measured=there)
+    assert run(*command, "--measured", "there.csv").stdout.startswith(str(expected))
+    replace(there, sigma=None).write(tmp_path / "bare.csv")  # as what --noise says
+    assert run(*command, "--measured", "bare.csv").stdout.startswith(str(expected))
+    along = pk.plan_poses(robot, poses, 5, kind="pose", noise=0.03, direction=(0, 0, 1))
+    assert run(*command, "--direction", "z").stdout.startswith(str(along))
+    assert run(*command, "--direction", "0,0,1").stdout.startswith(str(along))
+    assert "expected x, y or z" in refused(*command, "--direction", "up")
+    assert "not all 0" in refused(*command, "--direction", "0,0,0")

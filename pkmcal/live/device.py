@@ -1,0 +1,90 @@
+"""What a machine and an instrument have to answer, so that a measurement can be made with them.
+
+A kind of machine or instrument is one file with one class, named in `registry`.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar, NamedTuple, Protocol
+
+from pkmcal.arrays import FloatArray
+from pkmcal.exceptions import Error
+from pkmcal.kinematics.robot import Robot
+
+
+class DeviceError(Error):
+    """A machine or an instrument does not answer, or refuses; says which and why."""
+
+
+class Where(NamedTuple):
+    """What a controller says of where its machine is.
+
+    Attributes
+    ----------
+    pose : ndarray (6,) or None
+        By its own numbers, mm and rad; NaN of what it does not say. None: it says nothing.
+    actuators : ndarray (n,) or None
+        Of its drives, as the robot file counts them. None: it says nothing.
+    """
+
+    pose: FloatArray | None = None
+    actuators: FloatArray | None = None
+
+
+class Machine(Protocol):
+    """A machine that is driven. Poses are those of the robot file, mm and rad.
+
+    Attributes
+    ----------
+    ADDRESS : str
+        What stands behind its word and a colon, for help; empty: nothing.
+    """
+
+    ADDRESS: ClassVar[str]
+
+    def require_ready(self) -> None:
+        """Raise a `DeviceError` that says why it cannot be driven; return where it can."""
+
+    def go(self, pose: FloatArray, feed: float) -> None:
+        """Drive straight to a pose (6,), at a feed in mm/min, and return when it stands still."""
+
+    def where(self) -> Where:
+        """What its controller says of where it is."""
+
+    def stop(self) -> None:
+        """Stop at once, whatever it does; called from any thread, also while `go` waits."""
+
+    def close(self) -> None:
+        """Leave it as it is, and free what was opened."""
+
+
+class Instrument(Protocol):
+    """An instrument that is read.
+
+    Attributes
+    ----------
+    ADDRESS : str
+        What stands behind its word and a colon, for help; empty: nothing.
+    """
+
+    ADDRESS: ClassVar[str]
+
+    def read(self, wanted: str) -> FloatArray:
+        """One reading (k,), mm and rad; NaN: nothing was seen. `wanted` says where and what."""
+
+    def close(self) -> None:
+        """Free what was opened."""
+
+
+def require_translations(robot: Robot, what: str) -> None:
+    """Refuse a machine whose poses are more than x, y, z: these words of G-code say no more.
+
+    Raises
+    ------
+    ValueError
+        The machine turns its platform.
+    """
+    if not set(robot.coordinates) <= {"x", "y", "z"}:
+        raise DeviceError(
+            f"{what}: drives x, y and z alone, and {robot.name} has {', '.join(robot.coordinates)}"
+        )

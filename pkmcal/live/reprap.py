@@ -1,0 +1,93 @@
+"""Machines with RepRapFirmware, by the HTTP requests of a Duet in standalone mode.
+
+Its page: github.com/Duet3D/RepRapFirmware/wiki/HTTP-requests: rr_connect, rr_gcode, rr_model;
+and docs.duet3d.com, object model: state.status, move.axes, move.compensation.
+"""
+
+from __future__ import annotations
+
+from time import monotonic, sleep
+from typing import Any
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray
+from pkmcal.kinematics.robot import Robot
+from pkmcal.live.device import DeviceError, Where, require_translations
+from pkmcal.live.http import Server
+
+_MOVE, _PAUSE = 600.0, 0.1  # s that a move may take, and between questions
+_THERE = 0.01  # mm that a place may differ from the command by
+_PASSWORD = "reprap"  # that of the firmware where none is set; no other is asked for or kept
+
+
+class RepRap:
+    """A Duet board by itself, without a password of its own."""
+
+    ADDRESS = "http://HOST"
+
+    def __init__(self, address: str, robot: Robot) -> None:
+        require_translations(robot, "reprap")
+        self._server = Server(address, "RepRapFirmware")
+        found = self._server.ask("/rr_connect", password=_PASSWORD)
+        if found.get("err") != 0:
+            why = {1: "it has a password (M551)", 2: "too many are connected"}
+            raise DeviceError(f"RepRapFirmware refuses: {why.get(found.get('err', 1), found)}")
+        if "sessionKey" in found:
+            self._server.headers["X-Session-Key"] = str(found["sessionKey"])
+
+    def require_ready(self) -> None:
+        """Raise a `DeviceError` unless it is idle, homed, and no mesh bends its moves."""
+        status = self._status()
+        if status != "idle":
+            raise DeviceError(f"the machine is {status}, where it should be idle")
+        move = self._model("move")
+        axes = [axis["letter"] for axis in move["axes"][:3] if not axis["homed"]]
+        if axes:
+            raise DeviceError(f"{', '.join(axes)} not homed: home it (G28)")
+        kind = move.get("compensation", {}).get("type", "none")
+        if kind != "none":
+            raise DeviceError(f"a {kind} compensation bends its moves: switch it off (G29 S2)")
+
+    def go(self, pose: FloatArray, feed: float) -> None:
+        """Drive straight to a place, in machine coordinates, and wait until it is there."""
+        x, y, z = pose[:3]
+        self._gcode(f"G21 G90 G53 G1 X{x:.5f} Y{y:.5f} Z{z:.5f} F{feed:.1f}")
+        end = monotonic() + _MOVE
+        while True:
+            status = self._status()
+            if status not in ("idle", "busy", "processing"):
+                raise DeviceError(f"the machine is {status} in a move")
+            if status == "idle" and np.abs(self._place() - pose[:3]).max() < _THERE:
+                return
+            if monotonic() > end:
+                raise DeviceError(f"the machine is not there after {_MOVE:g} s")
+            sleep(_PAUSE)
+
+    def where(self) -> Where:
+        """Where its axes are; it says nothing of its motors that the robot file could count."""
+        return Where(np.array([*self._place(), 0.0, 0.0, 0.0]))
+
+    def stop(self) -> None:
+        """M112: the board has to be started again (M999) and the machine homed."""
+        self._server.ask("/rr_gcode", wait=3.0, gcode="M112")
+
+    def close(self) -> None:
+        """End the session."""
+        self._server.text("/rr_disconnect", wait=3.0)
+
+    def _gcode(self, line: str) -> None:
+        self._server.ask("/rr_gcode", gcode=line)
+
+    def _status(self) -> str:
+        return str(self._model("state").get("status"))
+
+    def _place(self) -> FloatArray:
+        axes = self._model("move")["axes"][:3]
+        return np.array([float(axis["machinePosition"]) for axis in axes])
+
+    def _model(self, key: str) -> dict[str, Any]:
+        found = self._server.ask("/rr_model", key=key, flags="vn").get("result")
+        if not isinstance(found, dict):
+            raise DeviceError(f"RepRapFirmware: its object model has no {key}")
+        return found
