@@ -19,7 +19,7 @@ from pkmcal.fitted.held_numbers import held_numbers
 from pkmcal.fitted.left_out import effect_columns
 from pkmcal.geometry.stated_uncertainty import SCALE, StatedUncertainty
 from pkmcal.kinematics.calibratable import ArmMachine, Calibratable
-from pkmcal.readings.reading import Predicted
+from pkmcal.readings.predicted import Predicted
 from pkmcal.statistics.score_test import Columns
 
 _LEAST_TRAVEL = 0.02  # of the machine's length, from which a place is more than an error

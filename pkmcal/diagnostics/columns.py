@@ -8,7 +8,7 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray, lots
 from pkmcal.fitted.fit import Fit
-from pkmcal.readings.reading import Predicted
+from pkmcal.readings.predicted import Predicted
 from pkmcal.statistics.score_test import Columns
 
 _TOGETHER = 4096  # rows

@@ -18,7 +18,7 @@ from pkmcal.display import chance_text, displayed, printable
 from pkmcal.estimation.fit_data import Dependence
 from pkmcal.estimation.uncertainty import Uncertainty
 from pkmcal.fitted.fit import Fit
-from pkmcal.readings.reading import Predicted
+from pkmcal.readings.predicted import Predicted
 from pkmcal.statistics.score_test import Columns, Score, score_test
 
 CHANCE = 0.01  # below which a target is said to be displaced

@@ -16,7 +16,7 @@ from pkmcal.diagnostics.columns import of_rows
 from pkmcal.diagnostics.visits import visits_of
 from pkmcal.display import chance_text
 from pkmcal.fitted.solution import Solution
-from pkmcal.readings.reading import Predicted
+from pkmcal.readings.predicted import Predicted
 from pkmcal.statistics.score_test import Columns, beside
 
 CHANCE = 1e-3  # below which readings are late

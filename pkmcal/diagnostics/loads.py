@@ -19,7 +19,7 @@ from pkmcal.fitted.solution import Solution
 from pkmcal.geometry.carried import Load
 from pkmcal.geometry.elastic import COMPLIANCE
 from pkmcal.kinematics.calibratable import ArmMachine, Calibratable
-from pkmcal.readings.reading import Predicted
+from pkmcal.readings.predicted import Predicted
 from pkmcal.statistics.score_test import Columns, score_test
 
 CHANCE = 0.01  # below which residuals follow the loads

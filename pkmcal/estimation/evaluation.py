@@ -11,7 +11,7 @@ from pkmcal.estimation.parameters import Parameters
 from pkmcal.estimation.row_states import RowStates
 from pkmcal.estimation.session_machines import Machines
 from pkmcal.kinematics.calibratable import Calibratable
-from pkmcal.readings.reading import Predicted
+from pkmcal.readings.predicted import Predicted
 
 
 class Cache(TypedDict, total=False):

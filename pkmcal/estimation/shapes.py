@@ -13,7 +13,8 @@ from pkmcal.arguments import kind
 from pkmcal.arrays import IntArray
 from pkmcal.effects.effect import EffectOfRows, Moved
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
-from pkmcal.readings.reading import Predicted, Reading
+from pkmcal.readings.predicted import Predicted
+from pkmcal.readings.reading import Reading
 
 
 def require_predicted(reading: Reading, rows: int, found: object) -> None:

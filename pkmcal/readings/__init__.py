@@ -12,8 +12,8 @@ from pkmcal.readings.distances import Distance as Distance
 from pkmcal.readings.distances import RelativeDistance as RelativeDistance
 from pkmcal.readings.points import Height as Height
 from pkmcal.readings.points import Position as Position
-from pkmcal.readings.reading import At as At
-from pkmcal.readings.reading import Predicted as Predicted
+from pkmcal.readings.predicted import At as At
+from pkmcal.readings.predicted import Predicted as Predicted
 from pkmcal.readings.reading import Reading as Reading
 from pkmcal.readings.touches import Touch as Touch
 from pkmcal.readings.turnings import Orientation as Orientation

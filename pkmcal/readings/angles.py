@@ -18,7 +18,8 @@ from pkmcal.files.csv_writer import WrittenColumn
 from pkmcal.readings import joint_angles
 from pkmcal.readings.distances import ZERO
 from pkmcal.readings.measured import InFit, Measured
-from pkmcal.readings.reading import At, Components, Predicted, Reading, Sets, Solve
+from pkmcal.readings.predicted import At, Predicted
+from pkmcal.readings.reading import Components, Reading, Sets, Solve
 from pkmcal.readings.unknowns import Dependence, Found, Start, always
 
 _COLUMN = re.compile(r"angle:(.+)")

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal.arguments import word
-from pkmcal.arrays import FloatArray, IntArray, as_rows, chained, first_of_equal
+from pkmcal.arrays import FloatArray, IntArray, as_rows, first_of_equal
 from pkmcal.core import instruments, screws
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.csv_table import Table
@@ -30,7 +30,8 @@ from pkmcal.readings.boards import Board
 from pkmcal.readings.lens_doubts import facing, lens_doubts
 from pkmcal.readings.lens_files import read_lens
 from pkmcal.readings.measured import InFit, Measured
-from pkmcal.readings.reading import At, Predicted, Reading, Sets, Solve
+from pkmcal.readings.predicted import At, Lots, Predicted, Shared
+from pkmcal.readings.reading import Reading, Sets, Solve
 from pkmcal.readings.seen_places import disagreement, in_agreement
 from pkmcal.readings.sight import visible
 from pkmcal.readings.unknowns import PLACE, Dependence, Numbers, Start, always
@@ -124,6 +125,7 @@ class Camera(Reading):
     tells_actuators: ClassVar[bool] = True
     scaled_by: ClassVar[str] = "board"
     frame_order: ClassVar[int] = 5
+    by_rows = ("lens", "size")
     own_points = ("corner",)
     truth = ("stands", "carried")
     stated = ("board",)
@@ -170,21 +172,36 @@ class Camera(Reading):
 
     # the model ------------------------------------------------------------------------------------
 
-    def predict(
+    def predict(self, at: At, **numbers: FloatArray) -> Predicted:
+        """Pixels of corners with a board, or camera, at `tool` (N, 6) from `tool_origin` (N, 6)."""
+        places = [at.pose, *(numbers[name] for name in ("tool_origin", "tool") if name in numbers)]
+        shape = len(at.pose), 6
+        first = first_of_equal(np.hstack([np.broadcast_to(each, shape) for each in places]))
+        of = np.repeat(np.arange(len(first)), np.diff(first, append=len(at.pose)))
+        return self.shared(at, Lots(of, first), **numbers).of_rows()
+
+    def lots(self, m: Measured) -> IntArray:
+        """Pictures."""
+        return self._pictures(m)
+
+    def shared(
         self,
         at: At,
+        lots: Lots,
         tool: FloatArray = _NOWHERE,
         tool_origin: FloatArray = _NOWHERE,
         corner: FloatArray | None = None,
         lens: FloatArray | None = None,
         size: FloatArray = _NO_SIZE,
         **numbers: FloatArray,
-    ) -> Predicted:
-        """Pixels of corners with a board, or camera, at `tool` (N, 6) from `tool_origin` (N, 6)."""
+    ) -> Shared:
+        """As `predict`, through the motion of each picture's board before the camera."""
+        count = len(at.pose)
         frame = _NOWHERE if at.frame is None else at.frame
-        each = np.hstack(np.broadcast_arrays(at.pose, tool_origin, tool))
-        first = first_of_equal(each)
-        pose, origin, within = (np.ascontiguousarray(part) for part in np.split(each[first], 3, 1))
+        pose, origin, within = (
+            np.ascontiguousarray(np.broadcast_to(each, (count, 6))[lots.first])
+            for each in (at.pose, tool_origin, tool)
+        )
         outer, near = screws.frames(np.stack([at.origin, frame]))
         base = outer @ near
         to_mounting = base @ screws.frames(pose) @ screws.frames(origin)
@@ -192,29 +209,30 @@ class Camera(Reading):
         if self.on == "platform":
             board = np.linalg.inv(board)
             to_board = -twists.adjoint(board)
-        picture = np.repeat(np.arange(len(first)), np.diff(first, append=len(each)))
-        seen, by_twist, by_lens, by_size, depth = instruments.pixels(
-            screws.pose(np.ascontiguousarray(board).reshape(-1, 16))[picture],
-            self._corners(len(each)) if corner is None else corner,
+        seen, by_motion, by_lens, by_size, depth = instruments.pixels(
+            screws.pose(np.ascontiguousarray(board).reshape(-1, 16))[lots.of],
+            self._corners(count) if corner is None else corner,
             self.lens_numbers() if lens is None else lens,
             size,
         )
         seen[~(depth > 0)] = np.nan
         of_pose = twists.adjoint(base[None]) @ twists.at_base(pose)
         of_tool = twists.adjoint(to_mounting) @ twists.twists_of_numbers(within)
-        by = [of_pose, of_tool]
+        of_frame = None
         if at.frame is not None:
             of_frame = twists.adjoint(outer[None]) @ twists.twists_of_numbers(at.frame[None])
-            by.append(np.broadcast_to(of_frame, of_pose.shape))
-        by_all = np.concatenate(by, axis=2)
+            of_frame = np.broadcast_to(of_frame, of_pose.shape)
         if to_board is not None:
-            by_all = to_board @ by_all
-        by_poses = chained(by_twist, by_all, picture)
-        return Predicted(
+            of_pose, of_tool = to_board @ of_pose, to_board @ of_tool
+            of_frame = None if of_frame is None else to_board @ of_frame
+        return Shared(
             seen,
-            by_poses[:, :, :6],
-            {"tool": by_poses[:, :, 6:12], "lens": by_lens, "size": by_size[:, :, None]},
-            by_frame=None if at.frame is None else by_poses[:, :, 12:],
+            lots,
+            by_motion,
+            of_pose,
+            {"tool": of_tool},
+            {"lens": by_lens, "size": by_size[:, :, None]},
+            of_frame,
         )
 
     def dependences(self, data: InFit) -> Iterator[Dependence]:

@@ -9,7 +9,8 @@ import numpy as np
 from pkmcal.arrays import FloatArray
 from pkmcal.files.csv_table import Table
 from pkmcal.readings.measured import Measured
-from pkmcal.readings.reading import At, Predicted, Reading
+from pkmcal.readings.predicted import At, Predicted
+from pkmcal.readings.reading import Reading
 
 
 @dataclass(frozen=True, eq=False)

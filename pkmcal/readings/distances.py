@@ -17,7 +17,8 @@ from pkmcal.files.csv_writer import WrittenColumn, numbered
 from pkmcal.readings import rows
 from pkmcal.readings.measured import InFit, Measured
 from pkmcal.readings.points import ORIGIN
-from pkmcal.readings.reading import At, Components, Predicted, Reading, Sets, Solve
+from pkmcal.readings.predicted import At, Predicted
+from pkmcal.readings.reading import Components, Reading, Sets, Solve
 from pkmcal.readings.unknowns import Dependence, Found, Start, always, point
 
 DISTANCE: Components = (("distance", "mm"),)

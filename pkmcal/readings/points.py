@@ -14,7 +14,8 @@ from pkmcal.files.column_names import is_turned
 from pkmcal.files.csv_table import Table
 from pkmcal.readings.alignment import Laid, Sighting, frame_of_points, of_heights
 from pkmcal.readings.measured import InFit, Measured
-from pkmcal.readings.reading import At, Predicted, Reading
+from pkmcal.readings.predicted import At, Predicted
+from pkmcal.readings.reading import Reading
 from pkmcal.readings.unknowns import POINT, Dependence, point
 
 ORIGIN = np.zeros(3)

@@ -10,8 +10,7 @@ row touches.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, ClassVar, Literal, NamedTuple, Protocol, TypeVar
 
 import numpy as np
@@ -24,12 +23,12 @@ from pkmcal.files.csv_writer import WrittenColumn
 from pkmcal.readings import orientation, rows
 from pkmcal.readings.alignment import Laid, Sighting
 from pkmcal.readings.measured import InFit, Measured
+from pkmcal.readings.predicted import At, Lots, Predicted, Shared
 from pkmcal.readings.unknowns import Dependence, Found
 
 Components = tuple[tuple[str, str], ...]
 Sets = Sequence[tuple[InFit, FloatArray]]  # rows of a calibration, and their nominal poses
 Own = TypeVar("Own", bound="Reading")
-NOWHERE = np.zeros(6)
 
 
 class Solve(Protocol):
@@ -41,32 +40,6 @@ class Solve(Protocol):
 
     def __call__(self, actuators: FloatArray, argument: str) -> Any:
         """Solve rows of actuators; what cannot be solved is refused as this argument's fault."""
-
-
-@dataclass(frozen=True)
-class Predicted:
-    """Readings of one kind and their derivatives.
-
-    Attributes
-    ----------
-    values : ndarray (N, k)
-        In the units of the components. Derivatives of the three angles of orientations are those
-        of the turning in the instrument's axes.
-    by_twist : ndarray (N, k, 6)
-        Derivative to the twist of the platform: ω, then the velocity of its origin, in base axes.
-    by : mapping of str to ndarray (N, k, w)
-        Derivative to each argument of `predict` that the kind depends on, by its name.
-    by_frame : ndarray (N, k, 6) or None
-        Derivative to the pose of the base, counted from the origin; None where there is no frame.
-    by_other : ndarray (N, k, 6) or None
-        Derivative to the twist of the platform at the second place; None where there is none.
-    """
-
-    values: FloatArray
-    by_twist: FloatArray
-    by: Mapping[str, FloatArray] = field(default_factory=dict)
-    by_frame: FloatArray | None = None
-    by_other: FloatArray | None = None
 
 
 class Family(NamedTuple):
@@ -87,61 +60,6 @@ class Family(NamedTuple):
     def noun(self) -> str:
         """What they are called."""
         return {"mm": "lengths", "rad": "angles"}.get(self.unit, f"readings in {self.unit}")
-
-
-def joined(parts: Sequence[Predicted], rows_of: Sequence[IntArray]) -> Predicted:
-    """Readings of one kind whose rows stand in several parts: in which rows each part's are."""
-    if len(parts) == 1:
-        return parts[0]
-    count = sum(map(len, rows_of))
-
-    def whole(of_parts: Sequence[FloatArray]) -> FloatArray:
-        found = np.empty((count, *of_parts[0].shape[1:]))
-        for values, mine in zip(of_parts, rows_of, strict=True):
-            found[mine] = values
-        return found
-
-    numbers = {
-        name: whole([vars(part)[name] for part in parts])
-        for name, values in vars(parts[0]).items()
-        if isinstance(values, np.ndarray)
-    }
-    by = {name: whole([part.by[name] for part in parts]) for name in parts[0].by}
-    return Predicted(**numbers, by=by)
-
-
-@dataclass(frozen=True, eq=False)
-class At:
-    """Where a machine is when something is read.
-
-    Attributes
-    ----------
-    pose : ndarray (N, 6)
-        Of the platform in the base frame, mm and rad.
-    other : ndarray (N, 6) or None
-        At the second place.
-    frame, origin : ndarray (6,)
-        Pose of the base in the instrument's frame, counted from `origin`; None: they are one.
-    axis : ndarray of int (N,) or None
-        Of touched lines and planes, which axis of its own each row's has.
-    machines : callable or None
-        Gives pairs of a machine and its rows; for what the pose alone does not determine.
-    measured : Measurements or None
-        The rows.
-    """
-
-    pose: FloatArray
-    other: FloatArray | None = None
-    frame: FloatArray | None = None
-    origin: FloatArray = field(default_factory=lambda: NOWHERE)
-    axis: IntArray | None = None
-    machines: Callable[[], Iterator[tuple[Any, IntArray]]] | None = None
-    measured: Measured | None = None
-
-    def of_rows(self) -> tuple[Measured, Iterator[tuple[Any, IntArray]]]:
-        """The rows and their machines, for a reading that needs both."""
-        assert self.measured is not None and self.machines is not None
-        return self.measured, self.machines()
 
 
 class Reading:
@@ -187,6 +105,8 @@ class Reading:
         Whether poses can be planned for the object that its word stands for.
     starts_by_pose : bool
         Whether `starts` needs the poses of the nominal machine.
+    by_rows : tuple of str
+        Arguments of `shared` that rows depend on by themselves, not through their lot's motion.
     per_row : tuple of str
         Fields with an entry for every row.
     labels : tuple of str
@@ -220,6 +140,7 @@ class Reading:
     by_firmware: ClassVar[bool] = False
     planned: ClassVar[bool] = True
     starts_by_pose: ClassVar[bool] = False
+    by_rows: ClassVar[tuple[str, ...]] = ()
     per_row: ClassVar[tuple[str, ...]] = ()
     labels: ClassVar[tuple[str, ...]] = ()
     anew: ClassVar[str] = ""
@@ -238,6 +159,20 @@ class Reading:
             Where the machine is.
         **numbers : ndarray (w,) or (N, w)
             The arguments that `dependences` names.
+        """
+        raise NotImplementedError
+
+    def lots(self, m: Measured) -> IntArray | None:
+        """The lot of each row (N,) by rows alone, of readings that `shared` can compute.
+
+        None: rows have nothing in common, and `predict` is all there is.
+        """
+        return None
+
+    def shared(self, at: At, lots: Lots, **numbers: FloatArray) -> Shared:
+        """As `predict`, through the motions of lots of rows at one place each.
+
+        What it returns stands for many rows by few equations, without a loss.
         """
         raise NotImplementedError
 
@@ -349,13 +284,6 @@ class Reading:
         """What takes a residual of each component to mm (k,): one number for all rows."""
         each = self.mm(m, length)
         return np.asarray(np.median(each, axis=0) if each.ndim > 1 else each, dtype=np.float64)
-
-    def distance_per_point(self, residual: FloatArray, m: Measured, length: float) -> FloatArray:
-        """How far off each measured point is, mm (N,); angles count as their arc."""
-        if self.units:
-            residual = residual * self.mm(m, length)
-        off: FloatArray = np.linalg.norm(residual, axis=1)
-        return off
 
     # rows -----------------------------------------------------------------------------------------
 

@@ -27,7 +27,8 @@ from pkmcal.readings.known_distances import (
 )
 from pkmcal.readings.measured import InFit, Measured
 from pkmcal.readings.points import ORIGIN, points, some_components
-from pkmcal.readings.reading import NOWHERE, At, Components, Predicted, Reading, Sets
+from pkmcal.readings.predicted import NOWHERE, At, Predicted
+from pkmcal.readings.reading import Components, Reading, Sets
 from pkmcal.readings.unknowns import PLACE, POINT, Dependence, Found, Start, always, point
 
 Artefact = Literal["point", "line", "plane", "sphere"]

@@ -25,7 +25,8 @@ from pkmcal.readings.alignment import (
 )
 from pkmcal.readings.measured import InFit, Measured
 from pkmcal.readings.points import PLACE_TITLE, points
-from pkmcal.readings.reading import At, Predicted, Reading, Sets
+from pkmcal.readings.predicted import At, Predicted
+from pkmcal.readings.reading import Reading, Sets
 from pkmcal.readings.unknowns import ANGLES, PLACE, Dependence, Found, Start, always
 
 _ORIGIN = np.zeros(3)

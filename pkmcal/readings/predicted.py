@@ -1,0 +1,157 @@
+"""What readings of one kind are at a machine, with their derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray, IntArray, chained
+from pkmcal.readings.measured import Measured
+
+NOWHERE = np.zeros(6)
+MOTION = 6  # numbers of the motion of a lot of rows: ω, then v
+
+
+@dataclass(frozen=True)
+class Predicted:
+    """Readings of one kind and their derivatives.
+
+    Attributes
+    ----------
+    values : ndarray (N, k)
+        In the units of the components. Derivatives of the three angles of orientations are those
+        of the turning in the instrument's axes.
+    by_twist : ndarray (N, k, 6)
+        Derivative to the twist of the platform: ω, then the velocity of its origin, in base axes.
+    by : mapping of str to ndarray (N, k, w)
+        Derivative to each argument of `predict` that the kind depends on, by its name.
+    by_frame : ndarray (N, k, 6) or None
+        Derivative to the pose of the base, counted from the origin; None where there is no frame.
+    by_other : ndarray (N, k, 6) or None
+        Derivative to the twist of the platform at the second place; None where there is none.
+    """
+
+    values: FloatArray
+    by_twist: FloatArray
+    by: Mapping[str, FloatArray] = field(default_factory=dict)
+    by_frame: FloatArray | None = None
+    by_other: FloatArray | None = None
+
+
+class Lots(NamedTuple):
+    """Rows in lots: those of a picture are one.
+
+    Attributes
+    ----------
+    of : ndarray of int (N,)
+        The lot of each row, 0 … L - 1.
+    first : ndarray of int (L,)
+        The first row of each.
+    """
+
+    of: IntArray
+    first: IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class Shared:
+    """Readings in lots whose rows follow the machine through one motion that they share.
+
+    As the corners of a picture do, through the motion of their board before the camera. However
+    many they are, all that they tell is told by as many rows as that motion has numbers, and one
+    more for each number that they depend on by themselves.
+
+    Attributes
+    ----------
+    values : ndarray (N, k)
+        As in `Predicted`.
+    lots : Lots
+        Of the rows.
+    by_motion : ndarray (N, k, 6)
+        Derivative to the motion, a twist.
+    by_twist, by_frame : ndarray (L, 6, 6)
+        How the motion follows the twist of the platform and the pose of the base; the latter is
+        None where there is no frame.
+    by : mapping of str to ndarray (L, 6, w)
+        How it follows arguments of `Reading.predict`, by their names.
+    own : mapping of str to ndarray (N, k, w)
+        Derivative to arguments that rows depend on by themselves: `Reading.by_rows`.
+    """
+
+    values: FloatArray
+    lots: Lots
+    by_motion: FloatArray
+    by_twist: FloatArray
+    by: Mapping[str, FloatArray]
+    own: Mapping[str, FloatArray]
+    by_frame: FloatArray | None = None
+
+    def of_rows(self) -> Predicted:
+        """The derivatives of each row."""
+        names, parts = list(self.by), [self.by_twist, *self.by.values()]
+        if self.by_frame is not None:
+            parts.append(self.by_frame)
+        ends = np.cumsum([part.shape[2] for part in parts])[:-1]
+        each = chained(self.by_motion, np.concatenate(parts, axis=2), self.lots.of)
+        by_twist, *others = np.split(each, ends, axis=2)
+        by_frame = None if self.by_frame is None else others.pop()
+        by = dict(zip(names, others, strict=True))
+        return Predicted(self.values, by_twist, {**by, **self.own}, by_frame=by_frame)
+
+
+def joined(parts: Sequence[Predicted], rows_of: Sequence[IntArray]) -> Predicted:
+    """Readings of one kind whose rows stand in several parts: in which rows each part's are."""
+    if len(parts) == 1:
+        return parts[0]
+    count = sum(map(len, rows_of))
+
+    def whole(of_parts: Sequence[FloatArray]) -> FloatArray:
+        found = np.empty((count, *of_parts[0].shape[1:]))
+        for values, mine in zip(of_parts, rows_of, strict=True):
+            found[mine] = values
+        return found
+
+    numbers = {
+        name: whole([vars(part)[name] for part in parts])
+        for name, values in vars(parts[0]).items()
+        if isinstance(values, np.ndarray)
+    }
+    by = {name: whole([part.by[name] for part in parts]) for name in parts[0].by}
+    return Predicted(**numbers, by=by)
+
+
+@dataclass(frozen=True, eq=False)
+class At:
+    """Where a machine is when something is read.
+
+    Attributes
+    ----------
+    pose : ndarray (N, 6)
+        Of the platform in the base frame, mm and rad.
+    other : ndarray (N, 6) or None
+        At the second place.
+    frame, origin : ndarray (6,)
+        Pose of the base in the instrument's frame, counted from `origin`; None: they are one.
+    axis : ndarray of int (N,) or None
+        Of touched lines and planes, which axis of its own each row's has.
+    machines : callable or None
+        Gives pairs of a machine and its rows; for what the pose alone does not determine.
+    measured : Measurements or None
+        The rows.
+    """
+
+    pose: FloatArray
+    other: FloatArray | None = None
+    frame: FloatArray | None = None
+    origin: FloatArray = field(default_factory=lambda: NOWHERE)
+    axis: IntArray | None = None
+    machines: Callable[[], Iterator[tuple[Any, IntArray]]] | None = None
+    measured: Measured | None = None
+
+    def of_rows(self) -> tuple[Measured, Iterator[tuple[Any, IntArray]]]:
+        """The rows and their machines, for a reading that needs both."""
+        assert self.measured is not None and self.machines is not None
+        return self.measured, self.machines()
