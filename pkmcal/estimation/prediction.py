@@ -97,8 +97,9 @@ class Prediction:
         """Rows of each set that are in each frame, by its first parameter."""
         found: RowsOfSets = {}
         for i, (data, part) in enumerate(zip(self.datasets, self.table.part_of, strict=True)):
-            if self.parameters.frame is not None and data.framed:
-                _collect(found, i, self.table.columns[part, self.parameters.frame])
+            if data.frame is not None:
+                number = self.parameters.nuisance[data.frame]
+                _collect(found, i, self.table.columns[part, number])
         return found
 
     @cached_property
@@ -343,10 +344,11 @@ class Prediction:
         self, part: FloatArray, i: int, rows: slice, seen: Predicted, direct: FloatArray | None
     ) -> None:
         """Add how readings follow numbers beside the pose to their derivatives (b, k, m)."""
-        places, frame = self.parameters.places, self.parameters.frame
+        places, named = self.parameters.places, self.datasets[i].frame
         if direct is not None:
             part[:, :, : len(places)] += direct[rows]
-        if seen.by_frame is not None and frame is not None:
+        if seen.by_frame is not None and named is not None:
+            frame = self.parameters.nuisance[named]
             part[:, :, frame : frame + 6] = seen.by_frame[rows]
         for name, numbers in self.numbers[i].items():
             own = numbers[rows]

@@ -85,6 +85,13 @@ def board_poses(
     return BoardPoses(pose, rms, possible)
 
 
+def facing(found: BoardPoses) -> FloatArray:
+    """Above 0 where a board is seen from the front (P,), its z pointing away from the camera."""
+    motion = screws.frames(np.ascontiguousarray(found.pose[:, 0]))
+    facing: FloatArray = (motion[:, :3, 2] * motion[:, :3, 3]).sum(axis=1)
+    return facing
+
+
 def unbent(pixel: FloatArray, lens: FloatArray) -> FloatArray:
     """Directions x/z, y/z (N, 2) of pixels (N, 2): the distortion undone; NaN where it folds."""
     bent = (pixel - lens[:, 2:4]) / lens[:, :2]

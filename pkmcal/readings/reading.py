@@ -162,6 +162,19 @@ class Reading:
         """
         raise NotImplementedError
 
+    @property
+    def frame_name(self) -> str:
+        """The name of the frame that readings are in, where there may be several; else ""."""
+        return ""
+
+    @property
+    def stands_by(self) -> str:
+        """What stands in that frame: of instruments that `placed` says nothing of, something else.
+
+        Readings of one frame have to agree on it.
+        """
+        return ""
+
     def lots(self, m: Measured) -> IntArray | None:
         """The lot of each row (N,) by rows alone, of readings that `shared` can compute.
 
@@ -388,6 +401,10 @@ class Reading:
         """
         names = [name for name, _ in self.components]
         return [", ".join(names)] if any(name in table.columns for name in names) else []
+
+    def rows_of(self, table: Table) -> IntArray | None:
+        """Rows of a table that it reads; None: all."""
+        return None
 
     def names(self, table: Table) -> set[str]:
         """Names of all columns of a table that this kind reads."""

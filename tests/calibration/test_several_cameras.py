@@ -1,0 +1,105 @@
+"""Several cameras and boards in one calibration: a frame and a lens, a tool and a size each."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pkmcal as pk
+from pkmcal.readings import Board, Camera
+
+FREE = ["base*", "platform*", "offset*"]
+PLATE, DISC = Board.chessboard(5, 4, 30), Board.chessboard(4, 3, 40)
+LENS: dict[str, Any] = {"fx": 1500.0, "fy": 1500.0, "cx": 640.0, "cy": 400.0, "k1": -0.1}
+STANDS = {"left": [-150, 120, 1950, 3.0, 0.1, 0.2], "right": [260, -80, 1800, -3.0, 0.05, 1.7]}
+CARRIED = {"plate": [-60, -45, 20, np.pi, 0, 0.3], "disc": [40, 70, 25, np.pi, 0.05, -0.8]}
+SCATTER, NOISE = 0.01, 0.1  # mm of legs, px
+
+
+def camera(name: str, board: str, **options: Any) -> Camera:
+    return Camera(
+        **LENS, camera_name=name, board_name=board, stands=STANDS[name], carried=CARRIED[board],
+        **options,
+    )  # fmt: skip
+
+
+def drawn(
+    pairs: list[tuple[str, str]], seed: int = 0, count: int = 24, **options: Any
+) -> tuple[pk.Robot, list[pk.Measurements]]:
+    """A hexapod with errors, and pictures of each board by each camera, at the same poses."""
+    random, robot = np.random.default_rng(seed), pk.load("hexapod")
+    names = robot.geometry.match(FREE)
+    true = robot.replace({n: robot.geometry[n] + random.normal(0.0, 0.3) for n in names})
+    told = robot.inverse(pk.sample_poses(robot, count, seed=1, share=0.25))
+    where = told + random.normal(0.0, SCATTER, told.shape)
+    sets = []
+    for name, board in pairs:
+        places = {"plate": PLATE, "disc": DISC}[board]
+        at, seeing = camera(name, board, **options).seeing(where, places)
+        seen = pk.VirtualMachine(true, NOISE, int(random.integers(99))).measure(at, seeing)
+        group = np.repeat(np.arange(count), len(places.ids))
+        rows = np.repeat(told, len(places.ids), axis=0)
+        sets.append(pk.Measurements(rows, seen.values, seen.instrument, group=group))
+    return true, sets
+
+
+def fitted(sets: list[pk.Measurements], **options: Any) -> pk.Identification:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", pk.CalibrationWarning)
+        return pk.identify(pk.load("hexapod"), sets, FREE, **options)
+
+
+EVERY = [("left", "plate"), ("left", "disc"), ("right", "plate"), ("right", "disc")]
+
+
+def test_each_camera_and_each_board_is_found_where_it_is() -> None:
+    _, sets = drawn(EVERY, lens="focal", find_size=True)
+    found = fitted(sets)
+    named = dict(zip(found.free, zip(found.values, found.stderr, strict=True), strict=True))
+    expected = {f"lens.{name}.fx": 1500.0 for name in STANDS}
+    expected |= {f"board.{board}.size": 0.0 for board in CARRIED}
+    for name, right in expected.items():
+        value, stderr = named[name]
+        assert abs(value - right) < 4.0 * stderr < np.inf, name
+    for name in STANDS:
+        assert named[f"frame.{name}.x"][0] == pytest.approx(STANDS[name][0], abs=20.0)
+    for board in CARRIED:
+        assert named[f"tool.board.{board}.x"][0] == pytest.approx(CARRIED[board][0], abs=5.0)
+    assert found.actuator_noise == pytest.approx(SCATTER, rel=0.4)
+    for noise in found.component_noise:
+        assert noise[0] == pytest.approx(NOISE, rel=0.15)
+
+
+def test_two_cameras_and_two_boards_tell_more_than_one() -> None:
+    """Of the same machine; beside it they tell a frame and a tool more."""
+    true, sets = drawn(EVERY, seed=2)
+    one, several = fitted(sets[:1]), fitted(sets)
+    robot = pk.load("hexapod")
+    assert several.rank == one.rank + 12
+    poses = pk.sample_poses(robot, 20, seed=9, share=0.2)
+    q = robot.inverse(poses)
+    pulled = []
+    for found in (one, several):
+        off = found.robot.forward(q).pose - true.forward(q).pose
+        pulled.append(off)
+    assert np.std(pulled[1], axis=0)[:3].max() < np.std(pulled[0], axis=0)[:3].max()
+
+
+def test_a_camera_on_the_platform_and_one_on_the_base_are_told_apart() -> None:
+    _, sets = drawn([("left", "plate")])
+    unnamed = [replace(each, instrument=replace(each.instrument, camera_name="")) for each in sets]
+    rides = replace(unnamed[0].instrument, on="platform", board_name="")
+    both = [unnamed[0], replace(unnamed[0], instrument=rides)]
+    with pytest.raises(pk.ArgumentError, match="camera and board stand each in a place"):
+        fitted(both)
+    heights = pk.VirtualMachine(pk.load("hexapod"), 0.01).measure(
+        pk.load("hexapod").inverse(pk.sample_poses(pk.load("hexapod"), 12, seed=5)), "position"
+    )
+    with pytest.raises(pk.ArgumentError, match="camera_name"):
+        fitted([unnamed[0], heights], unknown={"frame": "unknown"})
+    found = fitted([sets[0], heights], unknown={"frame": "unknown"})
+    assert {"frame.left.x", "frame.x"} <= {*found.free}
