@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import warnings
+from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -103,3 +106,55 @@ def test_a_camera_on_the_platform_and_one_on_the_base_are_told_apart() -> None:
         fitted([unnamed[0], heights], unknown={"frame": "unknown"})
     found = fitted([sets[0], heights], unknown={"frame": "unknown"})
     assert {"frame.left.x", "frame.x"} <= {*found.free}
+
+
+def written(path: Path, sets: list[pk.Measurements], pairs: list[tuple[str, str]]) -> None:
+    """One file of all rows, with columns camera and board."""
+    lines = [
+        "camera,board,image,corner,u [px],v [px]," + ",".join(f"q{i} [mm]" for i in range(1, 7))
+    ]
+    for measured, (name, board) in zip(sets, pairs, strict=True):
+        ids = {"plate": PLATE, "disc": DISC}[board].ids
+        each = zip(
+            measured.group, np.tile(ids, 99), measured.values, measured.actuators, strict=False
+        )
+        for picture, corner, pixel, q in each:
+            if np.isfinite(pixel).all():
+                cells = [
+                    name,
+                    board,
+                    f"{picture}.png",
+                    corner,
+                    *map(repr, map(float, [*pixel, *q])),
+                ]
+                lines.append(",".join(map(str, cells)))
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def test_a_file_of_several_cameras_and_boards_is_calibrated_as_its_sets(
+    tmp_path: Path, run: Callable[..., Any], refused: Callable[..., str]
+) -> None:
+    _, sets = drawn(EVERY, count=18)
+    written(tmp_path / "pixels.csv", sets, EVERY)
+    matrix = "camera_matrix: !!opencv-matrix\n  rows: 3\n  cols: 3\n  dt: d\n"
+    lens = f"%YAML:1.0\n---\n{matrix}  data: [1500, 0, 640, 0, 1500, 400, 0, 0, 1]\n"
+    (tmp_path / "lens.yaml").write_text(
+        lens + "distortion_coefficients: [-0.1, 0, 0, 0, 0]\n", encoding="utf-8"
+    )
+    free = [word for each in FREE for word in ("--free", each)]
+    told = ["calibrate", "hexapod", tmp_path / "pixels.csv", *free]
+    cameras = [w for name in STANDS for w in ("--camera", f"{name}={tmp_path / 'lens.yaml'}")]
+    boards = ["--board", "plate=chessboard:5x4,30", "--board", "disc=chessboard:4x3,40"]
+    result = run(*told, "--json", *cameras, *boards)
+    assert result.exit_code in (0, 1), result.output
+    report = json.loads(result.stdout)
+    direct = fitted(sets)
+    assert {*report["parameters"]} == {*direct.free}
+    for name in ("frame.left.x", "frame.right.gamma", "tool.board.disc.y"):
+        value = direct.values[direct.free.index(name)]
+        assert report["parameters"][name]["value"] == pytest.approx(value, abs=1e-3)
+    alone = ["--camera", tmp_path / "lens.yaml", "--board", "plate=chessboard:5x4,30"]
+    assert "column 'camera': there are several, left, right" in refused(*told, *alone)
+    assert "name each of several" in refused(*told, *cameras[:2], *alone)
+    other = ["--camera", f"top={tmp_path / 'lens.yaml'}", *boards[:2]]
+    assert "no row of 'top'" in refused(*told, *other)
