@@ -15,7 +15,7 @@ release = metadata.version("pkmcal")
 
 # The root is the source folder, so that one relative link serves the site and the repository.
 root_doc = "docs/index"
-include_patterns = ["*.md", "docs/**.md", "examples/*/README.md"]
+include_patterns = ["*.md", "docs/**.md", "examples/*/README.md", "benchmarks/recorded/*.md"]
 templates_path = ["templates"]
 html_additional_pages = {"index": "to_first_page.html"}
 

@@ -102,7 +102,7 @@ def whole(name: str, value: object, least: int, most: float = math.inf, note: st
 
 
 def word(name: str, value: object, known: Collection[W]) -> W:
-    """One of the known words.
+    """Check that an argument is one of the known words.
 
     Raises
     ------
@@ -180,7 +180,7 @@ def function(name: str, value: T) -> T:
 
 
 def executor(value: Executor | None) -> Executor | None:
-    """Whose workers compute, or None.
+    """Return the executor that an argument gives, or None.
 
     Raises
     ------
@@ -193,7 +193,7 @@ def executor(value: Executor | None) -> Executor | None:
 
 
 def path(name: str, value: object) -> Path:
-    """Where a file or folder is.
+    """Return an argument as the path of a file or folder.
 
     Raises
     ------
@@ -223,7 +223,7 @@ def comment(value: object) -> str:
 
 
 def kind(value: object) -> str:
-    """What class an argument is of."""
+    """Name the class of an argument, for messages."""
     return type(value).__name__
 
 

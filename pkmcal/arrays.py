@@ -72,7 +72,7 @@ def as_rows(name: str, array: ArrayLike, width: int) -> tuple[FloatArray, tuple[
 
 
 def as_doubles(given: NDArray[Any]) -> FloatArray:
-    """The same numbers as the core reads them: float64, one behind the other, aligned."""
+    """Return numbers as the core reads them: float64, contiguous, aligned."""
     doubles = np.ascontiguousarray(given, dtype=np.float64)
     return doubles if doubles.flags.aligned else doubles.copy()
 
@@ -154,7 +154,7 @@ def lots(count: int, most: int = 16384) -> Iterator[slice]:
 
 
 def first_of_equal(rows: FloatArray) -> IntArray:
-    """Which rows (N, k) differ from the one before: the first of each lot of equal ones."""
+    """Return the first row of each run of equal rows (N, k)."""
     changed = np.any(rows[1:] != rows[:-1], axis=1)
     return np.flatnonzero(np.concatenate([np.ones(len(rows[:1]), dtype=bool), changed]))
 

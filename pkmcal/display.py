@@ -45,7 +45,7 @@ def fixed(value: float, places: int) -> str:
 
 
 def rounded(value: float, places: int) -> str:
-    """As `fixed`; a value that tens or hundreds would make 0 has two significant digits.
+    """Print as `fixed`, but a value that rounds to 0 in tens has two significant digits.
 
     Examples
     --------
@@ -191,7 +191,7 @@ class Table:
         )
 
     def html(self) -> str:
-        """The same as a table element; what is between ``<`` and ``>`` in a cell is text."""
+        """Return a table as an HTML element; ``<`` and ``>`` in a cell are text."""
         body = [self._line("th", self.header), *(self._line("td", row) for row in self.rows)]
         return "<table>\n" + "\n".join(body) + "\n</table>"
 

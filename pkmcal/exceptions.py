@@ -6,14 +6,14 @@ from pkmcal.display import visible
 
 
 class _Shown(Exception):
-    """Its message steers no terminal, whatever names from files it quotes."""
+    """An error or warning whose message steers no terminal, whatever it quotes."""
 
     def __str__(self) -> str:
         return visible(super().__str__())
 
 
 class Error(_Shown):
-    """What pkmcal raises about its arguments and files."""
+    """An error about the arguments or files of pkmcal."""
 
 
 class ArgumentError(Error, ValueError):
@@ -29,7 +29,7 @@ class FitError(ArgumentError):
 
 
 class FileError(ArgumentError):
-    """What a file says makes no sense; the message names the file and, where it can, the line."""
+    """An error in a file; the message names the file and, where it can, the line."""
 
 
 class MissingFileError(FileNotFoundError, FileError):
@@ -39,4 +39,4 @@ class MissingFileError(FileNotFoundError, FileError):
 
 
 class CalibrationWarning(_Shown, UserWarning):
-    """What `identify` has to say about a fit that succeeded."""
+    """A warning of `identify` about a fit that succeeded."""

@@ -90,25 +90,25 @@ class RowResult(Result):
 
     @property
     def ok(self) -> NDArray[np.bool_]:
-        """Which rows were solved, (...)."""
+        """Mask of rows that were solved, (...)."""
         return np.equal(self.status, 0)
 
     @property
     def success(self) -> NDArray[np.bool_]:
-        """The same as `ok`."""
+        """Mask of rows that were solved, as `ok` does."""
         return self.ok
 
     @property
     def failed(self) -> NDArray[np.bool_]:
-        """Which rows were not solved, (...)."""
+        """Mask of rows that were not solved, (...)."""
         return np.not_equal(self.status, 0)
 
     def failures(self) -> str:
-        """What failed and where, in one line; empty where nothing did."""
+        """One line on what failed and where; empty where nothing did."""
         return failed_rows(np.ravel(self.status), self.STATUS)
 
     def _counts(self) -> str:
-        """How many rows have which status."""
+        """Count the rows of each status."""
         codes, counts = np.unique(self.status, return_counts=True)
         parts = (f"{n} {self.STATUS[int(code)]}" for code, n in zip(codes, counts, strict=True))
         total = "1 row" if np.size(self.status) == 1 else f"{np.size(self.status)} rows"

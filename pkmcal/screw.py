@@ -129,7 +129,7 @@ def adjoint(motion: ArrayLike) -> FloatArray:
 
 
 def exp_jacobian(twist: ArrayLike) -> FloatArray:
-    """How the exponential follows its twist: dT T⁻¹ = [J dξ] for T = exp([ξ]).
+    """Differentiate the exponential by its twist: dT T⁻¹ = [J dξ] for T = exp([ξ]).
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ def exp_jacobian(twist: ArrayLike) -> FloatArray:
 
 
 def log_jacobian(twist: ArrayLike) -> FloatArray:
-    """How the logarithm follows its motion: the inverse of `exp_jacobian` at the logarithm.
+    """Differentiate the logarithm by its motion: the inverse of `exp_jacobian` there.
 
     Parameters
     ----------
@@ -251,7 +251,7 @@ class JointError(Result):
         return float(self.twist[:3] @ self.twist[3:]) if self.kind == "helical" else math.inf
 
     def seen_from(self, frame: ArrayLike) -> JointError:
-        """The same error seen from outside, for a joint whose frame is there (eq. 18).
+        """Transform an error to the outside of a joint whose frame is there (eq. 18).
 
         Parameters
         ----------

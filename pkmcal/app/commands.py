@@ -1,4 +1,4 @@
-"""What each screen does, as lines for a terminal in the folder of the project."""
+"""The steps of each screen as command lines, to be typed in the folder of the project."""
 
 from __future__ import annotations
 

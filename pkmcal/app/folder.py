@@ -88,7 +88,7 @@ class Folder:
 
     @property
     def undoable(self) -> bool:
-        """Whether there is a state before."""
+        """True if there is an earlier state to return to."""
         return bool(self._before)
 
     def store(self, name: str, content: Path) -> str:
@@ -151,7 +151,7 @@ def _refuse_elsewhere(project: Project) -> None:
 
 
 def _is_own(name: str) -> bool:
-    """Whether pkmcal writes, or may write, a file or folder of this name."""
+    """Return whether pkmcal writes, or may write, a file or folder of this name."""
     return name in OWN or name.startswith(("new.", "for_")) or name.endswith(".part")
 
 
@@ -169,6 +169,6 @@ def named(project: Project) -> list[str]:
 
 
 def _outside(path: str) -> bool:
-    """Whether a path may lead out of the folder, or is the folder itself."""
+    """Return whether a path may lead out of the folder, or is the folder itself."""
     parts = Path(path).parts
     return not parts or Path(path).is_absolute() or ".." in parts or "\0" in path

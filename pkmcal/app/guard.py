@@ -1,4 +1,4 @@
-"""Who may ask the server: its own page with its token, on this computer, and nobody else."""
+"""The guard of the server: only its own page, with its token, on this computer may ask."""
 
 from __future__ import annotations
 

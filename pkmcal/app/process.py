@@ -22,7 +22,7 @@ Message = dict[str, Any]
 
 
 class Worker:
-    """One process at a time; requests wait for each other.
+    """A process that computes, one at a time; requests wait for each other.
 
     Parameters
     ----------

@@ -40,7 +40,7 @@ _SILENT = 15.0  # s, after which a stream of events says that it is there
 
 
 class Server:
-    """What answers the page of one project."""
+    """The server of one project's page."""
 
     def __init__(
         self,

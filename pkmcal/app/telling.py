@@ -1,4 +1,4 @@
-"""What a page is told of a machine and of a calibration: plain data, in the package's own words."""
+"""A machine and a calibration as plain data for a page, in the package's own words."""
 
 from __future__ import annotations
 

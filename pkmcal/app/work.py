@@ -1,4 +1,4 @@
-"""What the window computes: a machine, a plan, files as read, a fit, what is taken away.
+"""The computations of the window: machine, plan, files as read, fit, rows taken away.
 
 Each operation takes the table of the project and what the page gives besides, and returns plain
 data. Words of results are those of the package.
@@ -43,7 +43,7 @@ _LINES = 12  # of a file that are shown as they are
 
 @dataclass
 class Work:
-    """What was read and fitted last, to be quicker.
+    """A cache of what was read and fitted last.
 
     Attributes
     ----------

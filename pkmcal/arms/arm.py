@@ -192,7 +192,7 @@ class SerialArm(SerialChain, Result):
         return SerialArm(**changed)
 
     def corrected(self) -> SerialArm:
-        """The same arm without joint errors: they are built into its axes, points and home.
+        """Return the arm with its joint errors built into axes, points and home, none beside them.
 
         E₁…Eᵢ carries axis and point of joint i, and E₁…Eₙ the tool.
         """
@@ -229,7 +229,7 @@ class SerialArm(SerialChain, Result):
 
     @property
     def joint_laws(self) -> JointLaws:
-        """Its laws; without numbers where it has none."""
+        """Return the laws of the joints; without numbers where there are none."""
         return self.laws or JointLaws(JointPulls(self.axes, self.points, self.kinds))
 
     def approaching(self, approach: ArrayLike) -> SerialArm:
@@ -467,7 +467,7 @@ class SerialArm(SerialChain, Result):
         return urdf.limits(*self.source)
 
     def _is_alike(self, other: SerialArm) -> bool:
-        """Whether it is the same arm without the joint errors, up to rounding."""
+        """Return whether another arm equals this one up to rounding, joint errors apart."""
         if self.kinds != other.kinds:
             return False
         pairs = ((self.screws, other.screws), (self.points, other.points), (self.home, other.home))

@@ -26,7 +26,7 @@ HEADER = "# A serial arm for pkmcal, at zero: lengths in mm, angles in rad.\n"
 
 
 def is_arm(data: Mapping[str, Any]) -> bool:
-    """Whether the content of a file is that of an arm: it has joints in place of limbs."""
+    """Return whether the content of a file is that of an arm: it has joints in place of limbs."""
     return "joint" in data and "limb" not in data
 
 

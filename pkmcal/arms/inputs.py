@@ -107,7 +107,7 @@ def kinds_of(given: str | Sequence[str] | None, joints: int) -> tuple[JointKind,
 
 
 def motion(name: str, given: ArrayLike) -> FloatArray:
-    """One finite motion, given as (4, 4) or as a pose (6,)."""
+    """Check a finite motion, given as (4, 4) or as a pose (6,)."""
     given = as_numbers(name, given, "4, 4")
     pose = given.shape == (6,)
     rows, shape = screw.as_motions(name, screw.from_pose(given) if pose else given)

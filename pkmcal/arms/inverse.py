@@ -27,7 +27,7 @@ _OK, _NOT_CONVERGED, _INVALID = 0, 1, 4
 
 
 class Solvable(Protocol):
-    """What the search asks an arm for; `SerialChain` describes each."""
+    """The interface that the search asks of an arm; `SerialChain` describes each member."""
 
     @property
     def n_joints(self) -> int:
@@ -45,7 +45,7 @@ class Solvable(Protocol):
         """The arm in the state that it has in some rows of a call."""
 
     def forward(self, theta: ArrayLike, joint_errors: ArrayLike | None = None) -> FloatArray:
-        """Where the tool is, (..., 4, 4)."""
+        """Return the tool's frame, (..., 4, 4)."""
 
     def jacobian(
         self,

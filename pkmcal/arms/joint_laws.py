@@ -1,4 +1,4 @@
-"""What joints of an arm add to their commands: sag, gears, coupled axes, backlash.
+"""Laws that joints of an arm add to their commands: sag, gears, coupled axes, backlash.
 
 Of each joint q̃ = q + Σ v φ(q), linear in numbers v that are given or identified:
 
@@ -53,7 +53,7 @@ class Term(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Its name among the numbers of the arm."""
+        """Name of the term among the numbers of the arm."""
         own = self.joint + 1
         match self.kind:
             case "sag":
@@ -69,7 +69,7 @@ class Term(NamedTuple):
 
 
 def sag_term(joint: int, link: int, axis: int) -> Term:
-    """What a moment of a link along an axis, all counted from 0, turns a joint."""
+    """Return the angle by which a unit moment of a link turns a joint about an axis, from 0."""
     return Term(joint, "sag", 3 * link + axis)
 
 
@@ -153,7 +153,7 @@ class JointLaws:
 
     @cached_property
     def terms(self) -> tuple[Term, ...]:
-        """Its numbers, joint by joint."""
+        """Terms of the laws, joint by joint."""
         return tuple(sorted(self.numbers, key=lambda t: (t.joint, KINDS.index(t.kind), t.of)))
 
     @property
@@ -163,7 +163,7 @@ class JointLaws:
 
     @property
     def units(self) -> tuple[Unit, ...]:
-        """Their units."""
+        """Units of the terms."""
         return tuple(self._unit(term) for term in self.terms)
 
     def _unit(self, term: Term) -> Unit:
@@ -175,12 +175,12 @@ class JointLaws:
 
     @cached_property
     def yielding(self) -> bool:
-        """Whether a joint has a compliance."""
+        """True if a joint has a compliance."""
         return any(term.kind == "compliance" for term in self.numbers)
 
     @cached_property
     def values(self) -> FloatArray:
-        """Its numbers (k,)."""
+        """Values of the terms (k,)."""
         return np.array([self.numbers[term] for term in self.terms])
 
     def with_values(self, values: FloatArray) -> JointLaws:
@@ -188,24 +188,24 @@ class JointLaws:
         return replace(self, numbers=dict(zip(self.terms, values.tolist(), strict=True)))
 
     def with_terms(self, terms: Iterable[Term]) -> JointLaws:
-        """With these numbers beside its own, 0 where they are new."""
+        """Return the laws with more terms, 0 where they are new."""
         numbers = dict.fromkeys(terms, 0.0) | dict(self.numbers)
         return replace(self, numbers=numbers, memo=Memo())
 
     def approaching(self, approach: FloatArray) -> JointLaws:
-        """With joints that come from there, (n,) or (N, n)."""
+        """Return the laws for joints that come from these coordinates, (n,) or (N, n)."""
         return replace(self, approach=approach)
 
     def under(self, carried: AtTool | None) -> JointLaws:
-        """With what the tool carries, which compliances follow."""
+        """Return the laws under a load at the tool, which compliances follow."""
         return replace(self, pulls=self.pulls.under(carried))
 
     def weighing(self, masses: FloatArray, centres: FloatArray) -> JointLaws:
-        """With masses (n,) and centres (n, 3) of the links."""
+        """Return the laws with masses (n,) and centres (n, 3) of the links."""
         return replace(self, pulls=replace(self.pulls, masses=masses, centres=centres), memo=Memo())
 
     def of_rows(self, rows: IntArray) -> JointLaws:
-        """With the state that it has in some rows of a call; itself where that is the same."""
+        """Return the laws with their state in some rows of a call."""
         approach, pulls = self.approach, self.pulls.of_rows(rows)
         if approach is not None and approach.ndim == 2:
             approach = approach[rows]
@@ -216,7 +216,7 @@ class JointLaws:
     # what joints add ------------------------------------------------------------------------------
 
     def moved(self, theta: FloatArray) -> FloatArray:
-        """Where joints (N, n) are that are commanded to `theta` (N, n)."""
+        """Return the true joint coordinates (N, n) at the commands `theta` (N, n)."""
         found: FloatArray = theta.copy()
         np.add.at(found.T, self._joint, (self.basis(theta) * self.values).T)
         return found
@@ -282,7 +282,7 @@ class JointLaws:
 
     @cached_property
     def _sagging(self) -> bool:
-        """Whether products of gravity matter."""
+        """True if products of gravity matter."""
         return any(term.kind == "sag" for term in self.numbers)
 
     def _from(self, joint: int) -> FloatArray:
@@ -300,7 +300,7 @@ class JointLaws:
 
     @cached_property
     def _sags(self) -> FloatArray:
-        """What unit moments of the links turn each joint, (n, n, 3)."""
+        """Return how far unit moments of the links turn each joint, (n, n, 3)."""
         found = np.zeros((self._n, self._n, 3))
         for (joint, kind, of), value in zip(self.terms, self.values.tolist(), strict=True):
             if kind == "sag":
@@ -309,7 +309,7 @@ class JointLaws:
 
     @cached_property
     def _compliances(self) -> FloatArray:
-        """Of each joint (n,), rad/(N mm)."""
+        """Return the compliance of each joint (n,), rad/(N mm)."""
         found = np.zeros(self._n)
         for (joint, kind, _), value in zip(self.terms, self.values.tolist(), strict=True):
             if kind == "compliance":

@@ -1,4 +1,4 @@
-"""What pulls at the joints of an arm: weights of its links, what it carries, balancers.
+"""Loads at the joints of an arm: weights of its links, what it carries, balancers.
 
 From a turning joint to a point of the arm the way is Σ R_l D_l over the links behind the joint, R_l
 the rotation of link l and D_l a lever that is constant in its axes. A force there turns joint i by
@@ -47,7 +47,7 @@ class Posture(NamedTuple):
 
 
 class AtTool(NamedTuple):
-    """What a tool carries, in the axes of the base at zero; of all rows, or a row each (N, …).
+    """The load at the tool, in axes of the base at zero; of all rows, or one a row (N, …).
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class AtTool(NamedTuple):
     moment: FloatArray
 
     def of_rows(self, rows: IntArray) -> AtTool:
-        """That of some rows of a call."""
+        """Return the load in some rows of a call."""
         weight, centre, tool, force, moment = self
         if weight.ndim == 1:
             return self
@@ -77,7 +77,7 @@ class AtTool(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class JointPulls:
-    """What pulls at the joints of an arm.
+    """The weights and forces that load the joints of an arm.
 
     Parameters
     ----------
@@ -117,25 +117,25 @@ class JointPulls:
 
     @property
     def directed(self) -> bool:
-        """Whether gravity has a direction."""
+        """True if gravity has a direction."""
         return float(np.linalg.norm(self.gravity)) > 0.0
 
     @property
     def weighed(self) -> bool:
-        """Whether masses and centres of the links are known."""
+        """True if masses and centres of the links are known."""
         return self.masses is not None and self.centres is not None
 
     def under(self, carried: AtTool | None) -> JointPulls:
-        """With another load at the tool."""
+        """Return the loads with another load at the tool."""
         return replace(self, carried=carried)
 
     def of_rows(self, rows: IntArray) -> JointPulls:
-        """With the load of some rows of a call."""
+        """Return the loads in some rows of a call."""
         carried = None if self.carried is None else self.carried.of_rows(rows)
         return self if carried is self.carried else self.under(carried)
 
     def posture(self, turns: FloatArray) -> Posture:
-        """Where links and axes are after turns (N, n, 3, 3) about the joints' axes at zero."""
+        """Return frames of links and axes after turns (N, n, 3, 3) about the axes at zero."""
         rotation = np.empty_like(turns)
         before: FloatArray = np.broadcast_to(np.eye(3), turns[:, 0].shape)
         for i in range(turns.shape[1]):
@@ -144,14 +144,14 @@ class JointPulls:
         return Posture(rotation, np.einsum("nijk,ik->nij", rotation, self.axes))
 
     def products(self, at: Posture) -> FloatArray:
-        """Of joint i by link l, as `weights.gravity_products`, (N, n, n, 3).
+        """Return gravity products of joint i by link l as `weights.gravity_products`, (N, n, n, 3).
 
         Links before a joint are not left out.
         """
         return _products(at, self._down)
 
     def products_turning(self, at: Posture, moments: FloatArray) -> FloatArray:
-        """How the torque of `products` by moments (n, n, 3) changes with the joints, (N, n, n)."""
+        """Differentiate the torque of `products` by moments (n, n, 3) by the joints, (N, n, n)."""
         return self._turning(at, moments, self._down)
 
     def torques(self, at: Posture, theta: FloatArray) -> FloatArray:
@@ -168,7 +168,7 @@ class JointPulls:
         return found
 
     def torques_turning(self, at: Posture, theta: FloatArray) -> FloatArray:
-        """How `torques` change with the joints, (N, n, n)."""
+        """Differentiate `torques` by the joints, (N, n, n)."""
         count, n = theta.shape
         found = np.zeros((count, n, n))
         behind = np.triu(np.ones((n, n)))[..., None]
@@ -196,7 +196,7 @@ class JointPulls:
 
     @cached_property
     def _ways(self) -> FloatArray:
-        """From each joint's point to the next one's, 0 behind the last, (n, 3)."""
+        """Return the way from each joint's point to the next, 0 behind the last, (n, 3)."""
         found = np.zeros_like(self.points)
         found[:-1] = self.points[1:] - self.points[:-1]
         return found
@@ -227,7 +227,7 @@ class JointPulls:
         return found
 
     def _turning(self, at: Posture, levers: FloatArray, direction: FloatArray) -> FloatArray:
-        """How Σ_l z_i·(R_l D_il × f) changes with the joints, (N, n, n), D (…, n, n, 3)."""
+        """Differentiate Σ_l z_i·(R_l D_il × f) by the joints, (N, n, n), D (…, n, n, 3)."""
         rotation, axes = at
         found = np.zeros((*axes.shape[:2], axes.shape[1]))
         moments = (rotation[:, None] @ levers[..., None])[..., 0]

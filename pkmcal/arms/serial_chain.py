@@ -30,7 +30,7 @@ from pkmcal.geometry.stated_uncertainty import StatedUncertainty, Uncertain, sta
 
 
 class SerialChain:
-    """What a `SerialArm` computes: where its tool is, twists by joints and errors, the inverse.
+    """The computations of a `SerialArm`: tool frame, twists by joints and errors, inverse.
 
     Its parameters are those of `SerialArm`.
 
@@ -83,7 +83,7 @@ class SerialChain:
 
     @property
     def joint_names(self) -> tuple[str, ...] | None:
-        """What the joints are called, as in a URDF file and in logs of controllers."""
+        """Names of the joints, as in a URDF file and in logs of controllers."""
         return self._joint_names
 
     @property
@@ -93,12 +93,12 @@ class SerialChain:
 
     @property
     def laws(self) -> JointLaws | None:
-        """What joints add to their commands: sag, gears; None where they add nothing."""
+        """Laws that joints add to their commands: sag, gears; None where there are none."""
         return self._laws
 
     @property
     def uncertainty(self) -> StatedUncertainty:
-        """How wrong numbers may be that a calibration does not look for."""
+        """Stated uncertainty of numbers that a calibration does not look for."""
         return self._uncertainty
 
     @property
@@ -153,7 +153,7 @@ class SerialChain:
 
     @property
     def arguments(self) -> ArmArguments:
-        """Its arguments: ``SerialArm(**arm.arguments)`` is the same arm."""
+        """Arguments of the arm: ``SerialArm(**arm.arguments)`` equals it."""
         return {
             "axes": self.axes,
             "points": self.points,
@@ -175,7 +175,7 @@ class SerialChain:
         joint_errors: ArrayLike | None = None,
         threads: int | None = None,
     ) -> FloatArray:
-        """Where the tool is (eq. 5; with errors eq. 19).
+        """Compute the tool's frame (eq. 5; with errors eq. 19).
 
         Parameters
         ----------
@@ -332,7 +332,7 @@ class SerialChain:
     # --------------------------------------------------------------------------------------------
 
     def _moved(self, rows: FloatArray) -> FloatArray:
-        """Where the joints are that are commanded to these coordinates."""
+        """Return the true joint coordinates at these commands."""
         return rows if self._laws is None else self._laws.moved(rows)
 
     def _given(

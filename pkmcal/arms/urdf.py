@@ -89,7 +89,7 @@ def write(
 def weights(
     path: str | os.PathLike[str], tip: str | None, base: str | None
 ) -> tuple[FloatArray, FloatArray]:
-    """What hangs on each joint of the chain from base to tip, by the file's ``inertial``.
+    """Return the mass on each joint of the chain from base to tip, by the file's ``inertial``.
 
     Masses (n,), kg, and their centres (n, 3) with all joints at zero, in the base, mm. What joints
     beside the chain carry hangs on the chain's last joint before them; 0 where nothing is stated.

@@ -106,7 +106,7 @@ def tree(path: str | PathLike[str]) -> ElementTree.Element:
 
 
 def comments_around(path: str | PathLike[str]) -> tuple[str, str]:
-    """What is said before and behind the root element, a comment a line; a tree holds neither."""
+    """Return the comments before and behind the root element, which a tree does not keep."""
     around = _Around()
     parser = ElementTree.XMLParser(target=around)
     parser.feed(reading.content(path, reading.MOST_URDF))

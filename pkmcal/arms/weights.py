@@ -1,4 +1,4 @@
-"""What gravity does to the joints of an arm: torques by masses, and by moments of its links.
+"""Torques of gravity at the joints of an arm, by masses and by moments of its links.
 
 The torque on joint i is that of all links behind it. A link moves with its joint, so that masses
 and centres count as moments that are constant in the axes of the links.
@@ -21,7 +21,7 @@ _SETTLED = 1e-15  # rad and mm
 
 
 def link_motions(arm: SerialChain, theta: ArrayLike) -> FloatArray:
-    """How far each link has moved from where it is at zero.
+    """Return the motion of each link from where it is at zero.
 
     Parameters
     ----------
@@ -159,7 +159,7 @@ def link_moments(arm: SerialChain, masses: ArrayLike, centres: ArrayLike) -> Flo
 def at_rest(
     torques: Callable[[FloatArray], FloatArray], theta: FloatArray, compliance: FloatArray
 ) -> FloatArray:
-    """Where elastic joints come to rest: θ = θ_motor + c τ(θ), (N, n); NaN where they do not.
+    """Solve θ = θ_motor + c τ(θ) for elastic joints at rest, (N, n); NaN where there is no rest.
 
     Parameters
     ----------

@@ -25,7 +25,7 @@ EARLIER = ("frame", "target", "attachment", "datum", "expansion", "slack", "cova
 
 
 def unknown_roles(unknown: Unknown) -> dict[str, Known | Sequence[Known]]:
-    """What is "known" or "unknown" of each set, by role."""
+    """Return the roles, "known" or "unknown", of each set."""
     if not isinstance(unknown, Mapping):
         unknown = dict.fromkeys(cast(Any, words("unknown", unknown)), "unknown")
     known: dict[str, Known | Sequence[Known]] = dict.fromkeys(ROLES, "known")

@@ -66,7 +66,7 @@ class Bootstrap(Result):
 
     @property
     def n_failed(self) -> int:
-        """How many replicates did not converge."""
+        """Number of replicates that did not converge."""
         return int(np.isnan(self.values).any(axis=1).sum())
 
     @property

@@ -42,7 +42,7 @@ _UNIDENTIFIABLE = 1e-3  # mm a pose moves per mm along an unidentifiable combina
 
 
 class Identification(Solution[Machine], Result):
-    """What `identify` found. Arrays are in the order of `free`; mm and rad.
+    """The result of `identify`. Arrays are in the order of `free`; mm and rad.
 
     Its numbers are attributes that its base classes describe: `Solution`, and `HeldOut` for points
     that were not fitted.
@@ -50,17 +50,17 @@ class Identification(Solution[Machine], Result):
 
     @cached_property
     def _findings(self) -> dict[str, tuple[Any, ...]]:
-        """What checks found, by their names: each is made once, when somebody asks."""
+        """Findings of the checks by name; each is computed when it is first asked for."""
         return {}
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
-        """What `identify` warned of: what looks wrong with measurements or result."""
+        """Warnings of `identify` about measurements or result."""
         return tuple(each.text for each in Diagnosis(self, AT_ONCE, self._findings).said())
 
     @cached_property
     def verdict(self) -> Verdict:
-        """Whether the result can be believed: state, reasons and remarks.
+        """The verdict: can the result be believed? State, reasons and remarks.
 
         A robust fit is made beside a linear one where some rows seem to carry it, and what moved is
         looked for where held-out points contradict the fit.
@@ -73,7 +73,7 @@ class Identification(Solution[Machine], Result):
 
     @property
     def moved(self) -> tuple[Moved, ...]:
-        """What moved between the fitted measurements and others that were held out.
+        """Parameters that moved between the fitted measurements and others that were held out.
 
         Empty where nothing did: where the points held out were drawn from the same measurements,
         and where they do not contradict a fit of several spare equations.
@@ -82,19 +82,19 @@ class Identification(Solution[Machine], Result):
 
     @property
     def drift(self) -> Drift | None:
-        """Whether repeated poses moved with time; None where too few were repeated to say."""
+        """Test of drift of repeated poses; None where too few were repeated."""
         found: Drift | None = self._finding("drift")
         return found
 
     @property
     def measuring_order(self) -> MeasuringOrder | None:
-        """Whether residuals follow the order of measuring; None where too few can say."""
+        """Test of residuals against the order of measuring; None where there are too few."""
         found: MeasuringOrder | None = self._finding("measuring-order")
         return found
 
     @cached_property
     def breakeven(self) -> tuple[Breakeven, ...]:
-        """How wrong numbers that are not free may be before standard deviations are double.
+        """Errors of held numbers at which the standard deviations are double.
 
         Of lengths, angles and ratios; without those whose uncertainty is stated.
         """
@@ -102,7 +102,7 @@ class Identification(Solution[Machine], Result):
 
     @cached_property
     def law_tests(self) -> tuple[LawTest, ...]:
-        """Whether the free numbers of drive laws are needed: an F test of each kind against 0.
+        """F tests of the free numbers of drive laws, one of each kind, against 0.
 
         Nothing is said of kinds with a prior, or that the measurements do not determine.
         """

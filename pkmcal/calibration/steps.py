@@ -52,7 +52,7 @@ from pkmcal.statistics.covariance import CovarianceRule
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Which rows are fitted, which are held out, which are left out.
+    """The rows that are fitted, held out and left out.
 
     Attributes
     ----------

@@ -65,7 +65,7 @@ def misfit_table(found: Solution) -> Table:
 
 
 def counts(read: BoolArray) -> str:
-    """How many rows were fitted, and in how many of them more was read than the actuators."""
+    """Count the fitted rows, and those in which more was read than the actuators."""
     points, others = int(read.sum()), int((~read).sum())
     found = []
     if points:
@@ -164,7 +164,7 @@ def limits(
     outliers: Sequence[int],
     frames: bool,
 ) -> Iterator[str]:
-    """Where the result has limits: rank, correlations, outliers; `odd` names the last.
+    """List the limits of the result: rank, correlations, outliers; `odd` names the last.
 
     `frames`: whether a datum may be what is missing.
     """
@@ -194,7 +194,7 @@ def limits(
 
 
 def sessions(names: Sequence[str]) -> str:
-    """Which sessions there are, and of which the robot is."""
+    """Name the sessions, and the one that the robot is of."""
     shown = ", ".join(map(display.printable, names))
     last = display.printable(names[-1])
     return filled("sessions: ", f"{shown}; numbers without an @ are common, the robot is {last}'s")
@@ -216,7 +216,7 @@ def own_numbers(found: HeldOut) -> Table:
 
 
 def fitted_along(beside: Sequence[Nuisance]) -> str:
-    """How many numbers were fitted along since they are uncertain, and which moved."""
+    """Count the uncertain numbers that were fitted as well, and name those that moved."""
     far = [each.name for each in beside if each.moved]
     shown = f"; in the table those that moved by more than twice it: {listed(far)}" if far else ""
     return filled(
@@ -225,7 +225,7 @@ def fitted_along(beside: Sequence[Nuisance]) -> str:
 
 
 def bounds(names: Sequence[str]) -> str:
-    """Which parameters ended at a bound."""
+    """Name the parameters that ended at a bound."""
     return filled("at a bound, ± as if it were not there: ", ", ".join(names))
 
 

@@ -34,7 +34,7 @@ def not_pulled(robot: Robot) -> Iterator[Finding]:
 
 
 def said_of_cables(robot: Robot) -> str:
-    """What holds the platform, and what its cables say of themselves."""
+    """Describe what holds the platform, and what its cables show."""
     free = ", ".join(robot.coordinates)
     count, m = len(robot.model.limbs), robot.machine.m
     said = f"{count} cables for {m} coordinates ({free}){_held(robot)}"
@@ -45,7 +45,7 @@ def said_of_cables(robot: Robot) -> str:
 
 
 def _held(robot: Robot) -> str:
-    """How the cables hold the platform at home, as a part of a sentence; "" where they do not."""
+    """Describe how cables hold the platform at home, as a part of a sentence; "" without cables."""
     load = load_of(robot)
     if load is None or not _at_home(robot):
         return ""

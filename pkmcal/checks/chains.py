@@ -181,7 +181,7 @@ CHAIN_CHECKS = (
 
 
 def surplus(robot: Robot) -> str:
-    """What is remarkable of a machine of chains though it is no mistake; empty where nothing is."""
+    """List what is remarkable of a machine of chains though no mistake; empty where nothing is."""
     over = robot.machine.rows - robot.machine.m
     if over <= 0:
         return ""

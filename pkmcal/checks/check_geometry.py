@@ -74,7 +74,7 @@ class GeometryCheck(Result):
 
     @property
     def ok(self) -> bool:
-        """Whether no problems were found."""
+        """True if no problems were found."""
         return not self.findings
 
     @property

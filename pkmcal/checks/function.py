@@ -144,7 +144,7 @@ def _sizes(robot: Robot) -> dict[str, float]:
 
 
 def _alike(points: FloatArray) -> bool:
-    """Whether some joints are equally far from the origin, as in tables and not by error."""
+    """Return whether some joints are equally far from the origin, as in tables and not by error."""
     far = np.sort(np.linalg.norm(points, axis=1))
     return bool((np.diff(far) <= _SAME * far[1:]).any())
 
@@ -270,7 +270,7 @@ def _shown(robot: Robot, limb: int) -> tuple[float, str]:
 
 
 def _reached(robot: Robot, ends: FloatArray) -> float:
-    """How much of the way from home to the drives `ends` the forward kinematics follows."""
+    """Return the share of the way from home to the drives `ends` that can be followed."""
     start = robot.inverse(robot.home)
     goal = robot.machine.at_drives(robot.slots, ends[None])[0]
     pose = robot.home
@@ -350,7 +350,7 @@ def _beside(robot: Robot, poses: FloatArray, at_home: float) -> Iterator[Finding
 
 
 def _affine_error(robot: Robot) -> float | None:
-    """How far the joints of a hexapod's platform are from an affine image of those of its base."""
+    """Return how far platform joints of a hexapod are from an affine image of its base joints."""
     if robot.model.map != "spatial" or len(robot.model.limbs) < 6 or robot.model.chains:
         return None
     base, platform = (side.points for side in joints(robot))

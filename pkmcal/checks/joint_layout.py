@@ -1,4 +1,4 @@
-"""How the joints of a machine lie: their circles, their order, and what limbs have in common."""
+"""The layout of a machine's joints: circles, order, common traits of limbs."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ def slider_ways(robot: Robot) -> FloatArray:
 
 
 def on_rails(robot: Robot) -> bool:
-    """Whether the carriages of all limbs run on parallel rails side by side, three at least.
+    """Return whether the carriages of all limbs run on parallel rails side by side, three at least.
 
     Such a machine has no axis that its limbs lie around (Triaglide, Hexaglide).
     """
@@ -199,7 +199,7 @@ class Trait:
 
 
 def traits(robot: Robot) -> list[Trait]:
-    """What alike limbs have in common."""
+    """Return the common traits of limbs that are alike."""
     base, platform = along_axis(robot)
     mm = size(robot)
     degree = mm * np.pi / 180

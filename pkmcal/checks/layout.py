@@ -299,7 +299,7 @@ def _reading(values: FloatArray, stated: float) -> str:
 
 
 def _of_geometry(robot: Robot, name: str) -> tuple[FloatArray, str]:
-    """What the geometry has for a stated name, and its unit: one number, or one a limb."""
+    """Return the geometry's numbers for a stated name, one or one a limb, and their unit."""
     geometry = robot.geometry
     if name in geometry:
         return np.array([geometry[name]]), geometry.units[geometry.names.index(name)]

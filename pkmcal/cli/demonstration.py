@@ -126,7 +126,7 @@ class Demonstration(Result):
 
     @property
     def trusted(self) -> bool:
-        """Whether the calibration converged as expected."""
+        """True if the calibration converged as expected."""
         found = self.identification
         return found.converged and not found.warnings and rms(self.after) < 2 * self.expected
 

@@ -1,4 +1,4 @@
-"""How a command ends: the one place where whatever was raised becomes one line and an exit code.
+"""The end of a command: whatever was raised becomes one line and an exit code here.
 
 Codes: 0 done, 1 done but not to be trusted, 2 nothing done, because of what was given or because a
 file cannot be read or written, 3 nothing done, because of a mistake in this program; from 129 on
@@ -45,7 +45,7 @@ def code(error: BaseException, json: bool = False) -> int:
 
 
 def _reason(error: BaseException) -> tuple[str, int]:
-    """What to say of an error, and the exit code."""
+    """Return the sentence about an error, and the exit code."""
     if isinstance(error, KeyboardInterrupt):
         return interrupt.words(error), interrupt.code(error)
     if isinstance(error, MemoryError):
@@ -89,7 +89,7 @@ def _of_command_line(error: Any) -> str:
 
 
 def _of_program(error: BaseException) -> str:
-    """What was raised, and the last line of the package on the way there."""
+    """Return the error of the program, and the last line of the package on the way to it."""
     package = Path(__file__).parents[1]
     lines = [
         f"{file.relative_to(package).as_posix()}:{line}"

@@ -141,7 +141,7 @@ def template(machine: str) -> str:
 
 
 def _of_limbs(limbs: Sequence[dict[str, object]]) -> str:
-    """What explains the keys of these limbs."""
+    """Return the comments that explain the keys of these limbs."""
     if any(limb["kind"] == CHAIN for limb in limbs):
         return _CHAINS
     return "".join(_limb_keys(limbs))

@@ -1,4 +1,4 @@
-"""What verbs print."""
+"""Printed output of the verbs."""
 
 from __future__ import annotations
 

@@ -102,7 +102,7 @@ def stiffness(
 
 
 def _columns(found: pk.Stiffness, moved: FloatArray | None) -> dict[str, FloatArray]:
-    """What stands beside the poses (N,) in a file."""
+    """Return the columns beside the poses (N,) of a file."""
     direction, softest = found.softest
     columns = {f"along {axis} [N/mm]": found.stiffness_along(way) for axis, way in _AXES.items()}
     columns["softest [N/mm]"] = softest
@@ -113,7 +113,7 @@ def _columns(found: pk.Stiffness, moved: FloatArray | None) -> dict[str, FloatAr
 
 
 def _by_cut(cut: str | None, moved: FloatArray) -> str:
-    """How far a force moves the tool over the poses (N, 3)."""
+    """Return how far a force moves the tool at the poses (N, 3)."""
     size = np.linalg.norm(moved, axis=1)
     size = size[np.isfinite(size)]
     if not len(size):

@@ -59,11 +59,11 @@ class Taken(NamedTuple):
 
     @property
     def ok(self) -> BoolArray:
-        """Which poses the machine takes, (N,)."""
+        """Mask of poses that the machine takes, (N,)."""
         return np.asarray(self.missed <= self.most)
 
     def said(self) -> Iterator[str]:
-        """What was completed, and which poses the machine does not take."""
+        """Name the completed coordinates, and the poses that the machine does not take."""
         none = np.isnan(self.pose).any(axis=1)
         with np.errstate(invalid="ignore"):
             changed = (np.abs(self.pose - self.given) > ON_THE_MANIFOLD).any(axis=1)

@@ -119,7 +119,7 @@ def tolerance(
 
 
 def _columns(found: Tolerance) -> dict[str, FloatArray]:
-    """What is written beside each pose."""
+    """Return the columns beside each pose."""
     names = ("x", "y", "z", "alpha", "beta", "gamma")
     columns: dict[str, FloatArray] = {
         f"distance {word} [mm]": values

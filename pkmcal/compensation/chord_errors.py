@@ -1,4 +1,4 @@
-"""How far a machine leaves the straight lines of a program, and into how many parts they go."""
+"""Deviations of a machine from the straight lines of a program, and division of its moves."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class ChordErrors:
         self._program, self._machine, self._chord = program, machine, chord
 
     def unreached(self, move: Move) -> FileError:
-        """What is wrong with a move that has no command."""
+        """Describe why a move has no command."""
         return self._program.wrong(move.line, "the machine does not reach a pose of this move")
 
     def parts(self, moves: Sequence[Move]) -> tuple[IntArray, float]:

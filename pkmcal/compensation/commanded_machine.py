@@ -54,7 +54,7 @@ class CommandedMachine:
         ]
 
     def shown(self, pose: FloatArray) -> FloatArray:
-        """Of poses (..., 6) the axes, in mm and deg."""
+        """Return the axes of poses (..., 6), in mm and deg."""
         found: FloatArray = pose[..., self._places]
         return np.where(self._turns, np.degrees(found), found)
 
@@ -74,7 +74,7 @@ class CommandedMachine:
         return Load.of_rows(self._loads[carried]) if len(self._loads) else None
 
     def command(self, coordinates: FloatArray, carried: IntArray) -> FloatArray:
-        """What to write so that the calibrated machine goes there; NaN where it cannot.
+        """Return the command at which the calibrated machine is at a pose; NaN where there is none.
 
         Angles are in the turn of the coordinates; those of actuators in any.
         """
@@ -105,7 +105,7 @@ class CommandedMachine:
         return found
 
     def reached(self, command: FloatArray, near: FloatArray, carried: IntArray) -> FloatArray:
-        """Where the calibrated machine goes on a command."""
+        """Return the pose of the calibrated machine at a command."""
         poses = self._poses(near, self._calibrated)
         q = self._readings(command)
         solved = self._calibrated.forward(q, guess=poses, load=self._load(carried))
@@ -120,7 +120,7 @@ class CommandedMachine:
         return self._controller.inverse(poses, match=self._match)
 
     def bends(self, begin: FloatArray, end: FloatArray) -> tuple[IntArray, FloatArray]:
-        """Where on the ways between commands (N, axes) a drive is at a node of its table.
+        """Return shares of ways between commands (N, axes) at which a drive passes a node.
 
         Which of the ways, and at which share of it: the error has a bend there.
         """

@@ -250,7 +250,7 @@ def about_their_mean(turns: FloatArray, off: FloatArray) -> FloatArray:
 
 
 def _mean(off: FloatArray) -> FloatArray:
-    """Of the rows that were reached (n,); NaN where there is none."""
+    """Return the mean over the rows that were reached (n,); NaN where there is none."""
     reached = off[np.isfinite(off).all(axis=1)]
     mean: FloatArray = reached.mean(axis=0) if len(reached) else np.full(off.shape[1], np.nan)
     return mean

@@ -24,7 +24,7 @@ _INCH = 25.4
 
 @dataclass
 class _State:
-    """What a controller remembers from line to line.
+    """The state of a controller from line to line.
 
     Attributes
     ----------
@@ -123,11 +123,11 @@ class Program:
                 )
 
     def wrong(self, line: int, message: str) -> FileError:
-        """What is wrong with a line, counted from 0."""
+        """Return an error about a line, counted from 0."""
         return FileError(f"{self._place}, line {line + 1}: {message}")
 
     def read(self) -> Iterator[tuple[str, Move | None]]:
-        """Its lines with their ends, each with its move.
+        """Read the program's lines with their ends, each with its move.
 
         Raises
         ------
@@ -217,7 +217,7 @@ class Program:
             )
 
     def _meaning(self, command: Command) -> Meaning:
-        """What a command does to the poses of this program."""
+        """Return the meaning of a command for the poses of this program."""
         meaning = self.dialect.meaning(command.name, command.letters)
         if not command.name or meaning is Meaning.FOLLOWED:
             return Meaning.FOLLOWED
@@ -324,7 +324,7 @@ class Program:
         return "".join(f" {letter}{words[letter].value:.15g}" for letter in stated)
 
     def _fresh(self, state: _State) -> tuple[float | None, ...] | None:
-        """Where the controller is, if that is not where a move ended."""
+        """Return the controller's position where it is not the end of a move."""
         if not state.fresh:
             return None
         return tuple(
@@ -333,7 +333,7 @@ class Program:
         )
 
     def _target(self, axes: dict[str, Word], state: _State) -> tuple[float, ...]:
-        """Where a move ends."""
+        """Return the end of a move."""
         if not state.known.issuperset(self._letters):
             if not state.relative:
                 state.known |= axes.keys()

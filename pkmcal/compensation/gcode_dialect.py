@@ -14,7 +14,7 @@ Rule = Literal["M82 M83", "either", "last"]
 
 
 class Meaning(Enum):
-    """What a word does to the poses of a program; of refused words the reason."""
+    """The effect of a word on the poses of a program; of refused words the reason."""
 
     FOLLOWED = "moves and modes"
     HARMLESS = "moves nothing and changes no coordinate"
@@ -32,7 +32,7 @@ class Meaning(Enum):
 
     @property
     def refused(self) -> bool:
-        """Whether a program with such a word is refused."""
+        """True if a program with such a word is refused."""
         return self not in _TAKEN
 
 
@@ -49,7 +49,7 @@ NEVER_PASSED = (
 
 @dataclass(frozen=True)
 class Dialect:
-    """How a firmware reads G-code.
+    """The dialect of a firmware: how it reads G-code.
 
     Attributes
     ----------
@@ -124,14 +124,14 @@ class Dialect:
         return letter + (number if self.exact or not number else _shortest(number))
 
     def meaning(self, name: str, letters: frozenset[str]) -> Meaning | None:
-        """What a word with these letters means; None if the table has it not."""
+        """Return the meaning of a word with these letters; None if the table lacks it."""
         of_these = self.by_letters.get(name)
         if of_these is not None and not of_these[0].isdisjoint(letters):
             return of_these[1]
         return self.words.get(name)
 
     def e_is_relative(self, own: bool | None, axes: bool, last: bool | None) -> bool | None:
-        """Whether E is relative; None where that is not stated, or versions differ.
+        """Tell whether E is relative; None where that is not stated, or versions differ.
 
         Parameters
         ----------
@@ -149,7 +149,7 @@ class Dialect:
 def _agreed(
     rules: tuple[Rule, ...], own: bool | None, axes: bool, last: bool | None
 ) -> bool | None:
-    """What all rules say."""
+    """Return the answer on which all rules agree."""
     said = {"M82 M83": own, "either": True if axes else own, "last": last}
     found = {said[rule] for rule in rules}
     return found.pop() if len(found) == 1 else None

@@ -34,7 +34,7 @@ _REMARK_ALONE = _ascii(r"[ \t]*\([^()]*\)[ \t]*")
 
 
 class Word(NamedTuple):
-    """Where a word begins in its line, and its number begins and ends."""
+    """The place of a word in its line, and of its number."""
 
     at: int
     start: int
@@ -139,7 +139,7 @@ def _add(words: dict[str, Word], letter: str, word: Word) -> None:
 
 
 def _takes_axes(command: Command, dialect: Dialect) -> bool:
-    """Whether axis words of its block are a code's own, as those of G28 and G92 are."""
+    """Return whether axis words of its block are a code's own, as those of G28 and G92 are."""
     meaning = dialect.words.get(command.name)
     return command.name[0] == "G" and meaning not in (Meaning.FOLLOWED, Meaning.HARMLESS)
 

@@ -20,7 +20,7 @@ class Extrusion(NamedTuple):
 
 
 class Feed(NamedTuple):
-    """What F says, of lengths in mm and of angles in deg a minute; 0 where none was stated.
+    """Feed by F, mm and deg a minute; 0 where none was stated.
 
     A change of units behind F changes neither, though one F cannot state both then.
     """

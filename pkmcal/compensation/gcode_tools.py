@@ -1,4 +1,4 @@
-"""Which tool a program has in the machine, as its firmware changes it."""
+"""The tool that a program has in the machine, as its firmware changes it."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Tools:
         return sorted(found, key=lambda command: command.name != "T")
 
     def changes(self, command: Command, state: Carried) -> bool:
-        """Whether a command changes the tool; the state follows.
+        """Return whether a command changes the tool; the state follows.
 
         Raises
         ------

@@ -179,7 +179,7 @@ class Writer:
         return f"F{_figures(longer / (move.scale if written else 1.0) * rate / way)}"
 
     def _way(self, step: FloatArray) -> tuple[bool, float]:
-        """Whether a step has lengths, and how long it is to a feed: mm, or deg without any."""
+        """Tell whether a step has lengths, and its length for a feed: mm, or deg without any."""
         way = float(np.linalg.norm(step[self._lengths]))
         return way > 0.0, way or float(np.linalg.norm(step[~self._lengths]))
 

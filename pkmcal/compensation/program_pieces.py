@@ -78,7 +78,7 @@ class Pieces:
         return "".join(text)
 
     def _commands(self, moves: Sequence[Move], which: IntArray, points: FloatArray) -> FloatArray:
-        """What to write for points, going on from the command before."""
+        """Return the commands for points, continuing from the command before."""
         carried = np.array([move.carried for move in moves], dtype=np.intp)
         commands = self._machine.command(points, carried[which])
         unreached = which[~np.isfinite(commands).all(axis=1)]
@@ -99,7 +99,7 @@ class Pieces:
 
 
 def _lines_of(lines: _Lines, at: int, moves: int) -> int:
-    """Behind which line so many moves are complete."""
+    """Return the line behind which so many moves are complete."""
     while moves:
         moves -= lines[at][1] is not None
         at += 1

@@ -1,4 +1,4 @@
-"""Of a C header what says a robot of chains: its joints, and the motions from each to the next."""
+"""The chains of a robot in a C header: joints, and motions from each to the next."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _CALLED = ("arm_turned", "arm_slid", "motion_compose", "chain_turn", "chain_ball
 
 
 def contents(robot: Robot, prefix: str, number: Number) -> tuple[dict[str, Any], list[str]]:
-    """What the template says of chains, and the generated functions that it calls.
+    """Fill the template for chains, and list the generated functions that it calls.
 
     Raises
     ------
@@ -87,7 +87,7 @@ def contents(robot: Robot, prefix: str, number: Number) -> tuple[dict[str, Any],
 
 
 def _links(layout: ChainLayout, numbers: FloatArray) -> tuple[list[FloatArray], list[FloatArray]]:
-    """From each joint of a chain to the next and to its end, and the ball on the platform.
+    """Return motions from each joint of a chain to the next, to its end, and to the ball.
 
     As ``prepare_chains`` of csrc/chain_system.h has them.
     """
@@ -128,7 +128,7 @@ def _link(
 
 
 def _calls(layout: ChainLayout) -> list[str]:
-    """Of one step of every chain."""
+    """Return the calls for one step of every chain."""
     calls = []
     for chain, ball in enumerate(layout.ball):
         calls.append("chain_ball" if ball else "chain_closure")

@@ -89,7 +89,7 @@ def c_header(robot: Robot, path: str | PathLike[str], number: Number = "double")
 
 
 def prefix_of(path: Path) -> str:
-    """What names in C begin with, after the name of a file."""
+    """Return the prefix of names in C, from the name of a file."""
     name = re.sub(r"\W", "_", path.stem, flags=re.ASCII)
     return f"robot_{name}" if name[:1].isdigit() else name
 
@@ -112,7 +112,7 @@ def text_of(robot: Robot, prefix: str, number: Number) -> str:
 def _contents(
     robot: Robot, loaded: dict[str, Any] | None, prefix: str, number: Number
 ) -> dict[str, Any]:
-    """What the template says, by the names in it; `loaded` is what it says of loads."""
+    """Fill the template, by the names in it; `loaded` fills the part on loads."""
     machine, model = robot.machine, robot.model
     map = model.map
     laws = _laws(robot)
@@ -246,7 +246,7 @@ def _any(laws: list[LawNumbers], part: str) -> bool:
 
 
 def _starts(laws: list[LawNumbers], part: str) -> str:
-    """Where the harmonics or points of each law begin in one table of all; empty without any."""
+    """Return the start of each law's harmonics or points in one common table; empty without any."""
     counts = [len(getattr(law, part)) for law in laws]
     starts = np.cumsum([0, *counts]).tolist()
     return ", ".join(map(str, starts)) if starts[-1] else ""

@@ -1,4 +1,4 @@
-"""Of a C header what says the limbs of a robot: their numbers, drivers, rows and turns."""
+"""The limbs of a robot in a C header: their numbers, drivers, rows and turns."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _DRIVER_PARTS = ("inverse", "anchor", "radius", "derivatives")
 
 
 def contents(robot: Robot, prefix: str, number: Number) -> tuple[dict[str, Any], list[str]]:
-    """What the template says of limbs, and the generated functions that it calls."""
+    """Fill the template for limbs, and list the generated functions that it calls."""
     machine, model = robot.machine, robot.model
     limbs = model.limbs
     m, n = machine.m, machine.actuators
@@ -118,7 +118,7 @@ def numbers(
 
 
 def _geared(robot: Robot) -> list[bool]:
-    """Which limbs are the first of an actuator whose whole turns may leave another elsewhere.
+    """Mark the first limb of each actuator whose whole turns may leave another limb elsewhere.
 
     As `pkmcal.core` finds the turn that suits all: with laws always, else where gears differ.
     """
@@ -180,7 +180,7 @@ def _rows(robot: Robot) -> list[dict[str, Any]]:
 
 
 def prepared(robot: Robot) -> tuple[list[FloatArray], ...]:
-    """Of each limb what follows from its numbers alone, as the core computes it.
+    """Compute of each limb what follows from its numbers alone, as the core does.
 
     First and second direction of its anchor, the fixed frame of its base axis, and its axes.
     """

@@ -1,4 +1,4 @@
-"""What a C header holds of a machine that yields: compliances of offsets, and what pulls.
+"""A machine that yields in a C header: compliances of offsets, and the loads.
 
 At a pose the forces along the legs, screws or about the cranks are known, so that the inverse is
 that of the rigid machine and a solve of the size of its closures; forward goes through it until
@@ -24,7 +24,7 @@ from pkmcal.screw import from_pose
 
 
 def holds(robot: Robot) -> bool:
-    """Whether a header holds what yields of a robot: offsets alone, each of its own actuator."""
+    """Return whether a header can hold the compliances: of offsets, each of its own actuator."""
     model = robot.model
     if model.elastic is None or model.chains is not None or model.driven:
         return False
@@ -34,12 +34,12 @@ def holds(robot: Robot) -> bool:
 
 
 def not_held(robot: Robot) -> Loss | None:
-    """By how much a header is off that holds no sag; None where it holds all, or nothing sags."""
+    """Return the error of a header without sag; None where it holds all, or nothing sags."""
     return None if robot.model.elastic is None or holds(robot) else sag(robot)
 
 
 def contents(robot: Robot, number: Number) -> dict[str, Any]:
-    """What the template says of loads, by the names in it."""
+    """Fill the template for loads, by the names in it."""
     machine, elastic, geometry = robot.machine, robot.model.elastic, robot.geometry
     assert isinstance(machine, LoadedMachine) and elastic is not None
     one, several, whole = c_source.writers(number)

@@ -119,7 +119,7 @@ def largest(number: Number) -> float:
 def writers(
     number: Number,
 ) -> tuple[Callable[[float], str], Callable[[Any], str], Callable[[Any], str]]:
-    """What writes one number of a type, several, and several whole ones."""
+    """Return functions that write one number of a type, several, and several whole ones."""
 
     def one(value: float) -> str:
         return literal(value, number)
@@ -237,7 +237,7 @@ def _sincos(x: float) -> tuple[float, float]:
 
 @cache
 def axes_of_rows() -> dict[str, tuple[int, int]]:
-    """Of each row beside the sphere, the places of its axes on base and platform."""
+    """Return the places of the axes, on base and platform, of each row beside the sphere."""
     (rows,) = re.findall(r"#define EACH_ROW\(X\) (.*)", _text("names.h"))
     found = re.findall(r"X\(\w+, (\w+), (\d+), (\d+)\)", rows)
     return {name: (int(base), int(platform)) for name, base, platform in found}

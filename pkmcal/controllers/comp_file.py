@@ -34,7 +34,7 @@ MEANINGS: tuple[Meaning, ...] = ("positions", "trims")  # of COMP_FILE_TYPE 0 an
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ScrewTable(Result):
-    """What a file says of a screw, as a drive law has it.
+    """The content of a file about a screw, as a drive law has it.
 
     Attributes
     ----------

@@ -187,7 +187,7 @@ def of_reprap(text: str, place: str = "M665") -> FirmwareDelta:
 
 
 def reprap_bed(text: str, place: str) -> Bed:
-    """Where RepRapFirmware lets the nozzle go: within B of M665, where that states it.
+    """Return the bed of RepRapFirmware, within B of M665 where that is stated.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Which firmware wrote a file, by what stands in it."""
+"""Recognition of the firmware that wrote a file, by its content."""
 
 from __future__ import annotations
 
@@ -43,5 +43,5 @@ def firmware_of(text: str, place: str) -> Firmware:
 
 
 def _has_all(text: str, place: str, command: str, letters: str) -> bool:
-    """Whether a command has all these letters: RepRapFirmware's M851 knows Z alone."""
+    """Return whether a command has all these letters: RepRapFirmware's M851 knows Z alone."""
     return set(letters) <= settings(text, command, place, missing=True).keys()

@@ -31,7 +31,7 @@ _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)")
 
 
 class Setting(NamedTuple):
-    """What stands behind a letter, and where in the text."""
+    """The text behind a letter, and its place."""
 
     value: str
     start: int
@@ -144,7 +144,7 @@ def require_mm(text: str, place: str, *commands: str) -> None:
 
 
 def place_of(text: str, setting: Setting, place: str) -> str:
-    """Where a setting is, for messages."""
+    """Name the place of a setting, for messages."""
     return f"{place}, line {text.count(chr(10), 0, setting.start) + 1}"
 
 
@@ -232,7 +232,7 @@ def _codes(text: str) -> list[tuple[re.Match[str], tuple[str, int]]]:
 
 
 def _in_a_block(text: str, line: re.Match[str]) -> bool:
-    """Whether a line is indented under an `if` or a `while`."""
+    """Return whether a line is indented under an `if` or a `while`."""
     indent = _indent(line[0])
     for above in reversed(_LINE.findall(text, 0, line.start())):
         if above.strip() and _indent(above) < indent:

@@ -45,7 +45,7 @@ _SPOOL = Law(spool=True)
 
 
 class Spools(NamedTuple):
-    """What M666 says of the spools.
+    """The settings of the spools by M666.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class Spools(NamedTuple):
 
 
 class Hangprinter(NamedTuple):
-    """What a config.g says: anchors (4, 3), spools where it has M666, and what is left out."""
+    """The settings of a config.g: anchors (4, 3), spools where it has M666, what is left out."""
 
     anchors: FloatArray
     spools: Spools | None
@@ -180,7 +180,7 @@ def _anchor(size: Settings, letter: str, place: str) -> list[float]:
 
 
 def _winds(wound: Settings) -> bool:
-    """Whether M666 says anything of spools."""
+    """Return whether M666 says anything of spools."""
     return bool(set("QRUOLH") & set(wound))
 
 

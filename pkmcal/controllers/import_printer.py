@@ -67,7 +67,7 @@ _KINDS = {  # of limbs: what the machine is, and what its firmware stores
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Printer(Result):
-    """What a printer.cfg says, or what another firmware keeps.
+    """The settings of a printer.cfg, or those that another firmware keeps.
 
     Attributes
     ----------
@@ -189,7 +189,7 @@ def _of_maslow(path: str | PathLike[str], log: str | PathLike[str] | None = None
 
 
 def _of_marlin(path: str | PathLike[str]) -> Stored:
-    """What M503 lists."""
+    """Read the settings that M503 lists."""
     where, text = as_path("path", path), text_in(path, "replace")  # of comments
     delta, probe = of_marlin(text, str(where)), marlin_probe(text, str(where))
     about = _about(where, _GCODE_HEAD, "marlin", probe=probe)
@@ -197,7 +197,7 @@ def _of_marlin(path: str | PathLike[str]) -> Stored:
 
 
 def _of_reprap(path: str | PathLike[str]) -> Stored:
-    """What a config.g and the files that it runs say of a linear or rotary delta."""
+    """Read a linear or rotary delta of a config.g and the files that it runs."""
     started, where = running(path), as_path("path", path)
     text, place, notes, probe = started.text, str(where), started.notes, None
     try:
@@ -223,7 +223,7 @@ def _about(
     config: str = "",
     probe: tuple[float, float, float] | None = None,
 ) -> About:
-    """What a robot file says of the file it was made of."""
+    """Return the comment of a robot file on the file it was made of."""
     controller = Controller(firmware, config)
     return About(where.stem, head.format(file=where.name), probe, controller)
 

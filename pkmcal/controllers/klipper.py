@@ -98,7 +98,7 @@ def _linear(robot: Robot, project: bool) -> tuple[Values, tuple[float, ...], Los
 
 
 def _rotary(robot: Robot, project: bool) -> tuple[Values, tuple[float, ...], Loss]:
-    """The same of a rotary delta, rad a step."""
+    """Return the settings of a rotary delta, rad a step."""
     firmware, loss = rotary_delta.of_robot(robot, project, one_height=True)
     values = {("printer", "shoulder_radius"): firmware.radius}
     values["printer", "shoulder_height"] = firmware.heights[0]
@@ -111,7 +111,7 @@ def _rotary(robot: Robot, project: bool) -> tuple[Values, tuple[float, ...], Los
 
 
 def _as_in_the_file(values: Values, printer: PrinterConfig, angles: Mapping[str, float]) -> Values:
-    """Without what the firmware takes from elsewhere, and with angles in the file's turn."""
+    """Drop what the firmware takes from elsewhere; give angles in the file's turn."""
     kept = {}
     for (section, option), value in values.items():
         default = angles.get(section) if option == "angle" else None

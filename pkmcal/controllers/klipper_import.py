@@ -87,7 +87,7 @@ def _linear(printer: PrinterConfig) -> tuple[FirmwareDelta, list[float]]:
 
 
 def _bed(printer: PrinterConfig) -> Bed:
-    """Where the nozzle goes: within the print radius, or else where DELTA_CALIBRATE probes."""
+    """Return the bed: within the print radius, or else where DELTA_CALIBRATE probes."""
     radius = None
     for section, option in (("printer", "print_radius"), (_CALIBRATE, "radius")):
         if radius is None and printer.has(section, option):

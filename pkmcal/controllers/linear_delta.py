@@ -59,7 +59,7 @@ class FirmwareDelta:
 
 @dataclass(frozen=True)
 class Bed:
-    """Where a firmware lets the nozzle go.
+    """The bed: where a firmware lets the nozzle go.
 
     Attributes
     ----------
@@ -127,7 +127,7 @@ def require_delta(robot: Robot) -> None:
 
 
 def is_delta(robot: Robot) -> bool:
-    """Whether three carriages of their own, above it, move a platform that only translates."""
+    """Return whether three carriages of their own, above, move a platform without turning it."""
     above = all(limb.branch <= 0 for limb in robot.model.limbs)
     return _is_linear(robot) and robot.frames.trivial and above
 
@@ -143,7 +143,7 @@ def gains(robot: Robot) -> tuple[float, ...]:
 
 
 def as_built(robot: Robot) -> FirmwareDelta:
-    """The same towers, as if they were vertical and equally far: exact where they are."""
+    """Return the towers as if they were vertical and equally far: exact where they are."""
     slots = robot.slots
     towers = slots[:, 0:3] - slots[:, 3:6]
     angles = np.degrees(np.arctan2(towers[:, 1], towers[:, 0])) % 360.0

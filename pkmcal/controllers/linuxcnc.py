@@ -120,7 +120,7 @@ def contents(robot: Robot, folder: str) -> tuple[dict[str, str], Loss | None]:
 
 
 def _folded(robot: Robot) -> bool:
-    """Whether the component takes the drive laws, for one has more than a table and none backlash.
+    """Return whether the component takes the laws: one has more than a table, none backlash.
 
     Without such laws it is of joints behind their motors; LinuxCNC itself corrects these.
     """
@@ -147,7 +147,7 @@ def _tables(robot: Robot, plain: Robot) -> dict[int, str]:
 
 
 def _contents(robot: Robot, name: str) -> dict[str, Any]:
-    """What the templates say, by the names in them."""
+    """Fill the templates, by the names in them."""
     axes = _axes(robot)
     module = _MODULE + name
     header = header_of(robot, module, "double")

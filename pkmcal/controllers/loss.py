@@ -1,4 +1,4 @@
-"""How far a controller's model is from a robot, and which numbers of it are nearest."""
+"""The distance of a controller's model from a robot, and its nearest numbers."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ EXACT = 1e-6  # mm: firmware numbers have six decimals
 
 @dataclass(frozen=True)
 class Loss:
-    """How far a firmware's model is from the robot at the same actuators, over a workspace.
+    """The error of a firmware's model at equal actuators, over a workspace.
 
     Attributes
     ----------
@@ -36,7 +36,7 @@ class Loss:
 
     @property
     def exact(self) -> bool:
-        """Whether the firmware holds the robot."""
+        """True if the firmware holds the robot."""
         return self.worst <= EXACT
 
     def __str__(self) -> str:
@@ -54,19 +54,19 @@ def cylinder(across: float, high: float, count: int) -> FloatArray:
 
 
 def off_by(model: Robot, q: FloatArray, poses: FloatArray) -> FloatArray:
-    """How far (N, 3) a model of a machine that only translates is from poses (N, 6)."""
+    """Return how far (N, 3) a model of a machine that only translates is from poses (N, 6)."""
     found: FloatArray = model.forward(q, guess=poses).pose[:, :3] - poses[:, :3]
     return found
 
 
 def loss(model: Robot, q: FloatArray, poses: FloatArray, over: str) -> Loss:
-    """How far a model is from poses; infinitely where it has none."""
+    """Return how far a model is from poses; infinite where it has none."""
     off = np.nan_to_num(np.linalg.norm(off_by(model, q, poses), axis=1), nan=np.inf)
     return Loss(rms(off), float(off.max()), over)
 
 
 def sag(robot: Robot) -> Loss:
-    """How far a machine that yields is from the rigid one; infinitely where it gives way."""
+    """Return how far a machine that yields is from the rigid one; infinite where it gives way."""
     rigid = robot.rigid
     poses, q, _ = rigid.commanded(sample_poses(rigid, _SAGS, share=0.5))
     off = robot.forward(q, guess=poses).pose[:, :3] - poses[:, :3]
@@ -79,7 +79,7 @@ def sag(robot: Robot) -> Loss:
 
 
 def laws(arm: SerialArm) -> Loss:
-    """How far an arm is from the one whose joints stand where they are commanded."""
+    """Return how far an arm is from the one whose joints stand where they are commanded."""
     limits = arm.limits()
     turning = np.array([unit == "rad" for unit in arm.actuator_units])
     most = np.where(turning, np.pi, arm.length)

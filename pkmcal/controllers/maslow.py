@@ -163,7 +163,7 @@ def robot_text(anchors: FloatArray, about: About) -> str:
 
 
 def _corners(robot: Robot) -> list[int]:
-    """Which limb is in each corner, in the order of the motors."""
+    """Return the limb in each corner, in the order of the motors."""
     limbs = [(limb.kind, limb.actuator) for limb in robot.model.limbs]
     if robot.model.map != "xy" or limbs != [("cable", i) for i in range(4)]:
         raise ArgumentError(f"robot: {robot.name} is no point in the plane (map xy) on four cables")

@@ -197,7 +197,7 @@ class PrinterConfig:
             self._read(lines_of(text_in(file)), file, (*within, file))
 
     def has(self, section: str, option: str) -> bool:
-        """Whether there is such an option."""
+        """Return whether there is such an option."""
         return (section, option) in self._options
 
     def sections(self, *options: str) -> list[str]:
@@ -205,7 +205,7 @@ class PrinterConfig:
         return list(dict.fromkeys(section for section, name in self._options if name in options))
 
     def text(self, section: str, option: str, default: str | None = None, depth: int = 0) -> str:
-        """What an option says, `depth` names away from the one that was asked for.
+        """Return the text of an option, `depth` names away from the one that was asked for.
 
         Raises
         ------
@@ -224,7 +224,7 @@ class PrinterConfig:
         raise FileError(f"{self.place}: [{section}] {option} is missing{self._lacking()}")
 
     def _lacking(self) -> str:
-        """What a number may be missing for."""
+        """Name the causes for which a number may be missing."""
         return f"; {', '.join(self.absent)}, included, is not there" if self.absent else ""
 
     def number(self, section: str, option: str, default: float | None = None) -> float:
@@ -248,7 +248,7 @@ class PrinterConfig:
         return found
 
     def wrong(self, section: str, option: str, message: str) -> FileError:
-        """What is wrong with an option, as an error to raise."""
+        """Make an error about an option, to be raised."""
         where = self.place
         if (section, option) in self._options:
             found = self._options[section, option]
@@ -300,7 +300,7 @@ def read(path: str | PathLike[str]) -> PrinterConfig:
 
 
 def kinematics(printer: PrinterConfig) -> str:
-    """Of a delta, "delta" or "rotary_delta"; all else is refused."""
+    """Return the kind of a delta, "delta" or "rotary_delta"; all else is refused."""
     found = printer.text("printer", "kinematics")
     if found not in ANGLES:
         raise printer.wrong(

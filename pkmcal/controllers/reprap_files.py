@@ -1,4 +1,4 @@
-"""What RepRapFirmware runs when it starts: config.g, and the files that M501 and M98 name in it.
+"""The files that RepRapFirmware runs at its start: config.g, and those of M501 and M98.
 
 M501 runs config-override.g, to which M500 saves what a calibration of the firmware found; it
 usually stands last, so that its numbers are those in force. M98 P"file" runs another file of its
@@ -26,7 +26,7 @@ _SYS = "/sys/"
 
 @dataclass(frozen=True)
 class Running:
-    """What is run, in its order.
+    """The commands that are run, in their order.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class Running:
 
 
 def running(path: str | PathLike[str]) -> Running:
-    """What a config.g and the files it runs say.
+    """Read a config.g and the files it runs.
 
     Raises
     ------
@@ -119,7 +119,7 @@ class _Run:
 
 
 def _place(name: str, folder: Path) -> Path:
-    """Where a file of the card is, its folder sys being `folder`."""
+    """Return the place of a file of the card whose folder sys is `folder`."""
     name = _CARD.sub("", name)
     if name.lower().startswith(_SYS):
         name = name[len(_SYS) :]

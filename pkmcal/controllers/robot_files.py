@@ -26,7 +26,7 @@ _UNCERTAIN = """\
 
 @dataclass(frozen=True)
 class About:
-    """What a robot file says beside the machine.
+    """Statements of a robot file beside the machine.
 
     Attributes
     ----------

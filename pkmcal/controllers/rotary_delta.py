@@ -126,7 +126,7 @@ def require_rotary_delta(robot: Robot) -> None:
 
 
 def is_rotary_delta(robot: Robot) -> bool:
-    """Whether three cranks of their own move a platform that only translates."""
+    """Return whether three cranks of their own move a platform that only translates."""
     limbs = robot.model.limbs
     kinds = [(limb.kind, limb.actuator) for limb in limbs]
     cranks = kinds == [("RUS", i) for i in range(_TOWERS)]
@@ -134,7 +134,7 @@ def is_rotary_delta(robot: Robot) -> bool:
 
 
 def as_built(robot: Robot, one_height: bool = True) -> RotaryDelta:
-    """The same cranks, as if they were alike and turned in radial planes: exact where they do."""
+    """Return the cranks as if alike and turned in radial planes: exact where they are."""
     slots = robot.slots
     shoulders = slots[:, 0:3] - slots[:, 3:6]
     heights = shoulders[:, 2]

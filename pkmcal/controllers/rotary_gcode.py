@@ -29,7 +29,7 @@ _LEAST = -90.0  # deg: where the firmware's limit is not known
 
 
 def is_rotary(text: str, place: str) -> bool:
-    """Whether a config.g has the M669 of a rotary delta."""
+    """Return whether a config.g has the M669 of a rotary delta."""
     found = settings(text, "M669", place, missing=True)
     return number(found, "K", "M669", place, 0.0) == _KIND
 

@@ -1,4 +1,4 @@
-"""What a file of a firmware holds: a robot file made of it, and measurements it has stored."""
+"""The content of a firmware's file: a robot file made of it, and measurements it stores."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How a pose moves that more closures than free coordinates cannot meet at once.
+"""Motion of a pose that more closures than free coordinates cannot meet at once.
 
 It is where the rows balance, Jᵀ r = 0, with J their derivatives by the platform's steps, and moves
 as this does:
@@ -33,7 +33,7 @@ class _Rows(Protocol):
 
 
 class Balanced(Protocol):
-    """What is asked of a machine: see `pkmcal.core.machine.Machine`."""
+    """The interface that is asked of a machine: see `pkmcal.core.machine.Machine`."""
 
     struct: Any
     m: int
@@ -42,11 +42,11 @@ class Balanced(Protocol):
 
     @property
     def turning(self) -> BoolArray:
-        """Which drives are angles."""
+        """Mask of drives that are angles."""
 
     @property
     def reading_rows(self) -> IntArray:
-        """Which row is the first of each limb."""
+        """The first row of each limb."""
 
     def forward(
         self, slots: FloatArray, q: FloatArray, guess: FloatArray, threads: int | None
@@ -120,7 +120,7 @@ def by_actuators(
 
 
 def _is_angle(machine: Balanced, number: int) -> BoolArray:
-    """Of each limb, whether this number of it is one."""
+    """Tell of each limb whether this number of it is an angle."""
     if number == _OFFSET:
         return machine.turning
     tilt = number < len(SLOTS) and "tilt" in SLOTS[number]
@@ -128,14 +128,14 @@ def _is_angle(machine: Balanced, number: int) -> BoolArray:
 
 
 def _owners(machine: Balanced) -> tuple[IntArray, IntArray]:
-    """Of each row the limb, and of each limb the actuator."""
+    """Return the limb of each row, and the actuator of each limb."""
     first = np.append(machine.reading_rows, machine.rows)
     of_limb = np.repeat(np.arange(machine.struct.limbs), np.diff(first))
     return of_limb, np.array(list(machine.struct.actuator[0 : machine.struct.limbs]))
 
 
 def _balance(machine: Balanced, slots: FloatArray, pose: FloatArray, q: FloatArray) -> FloatArray:
-    """What each row adds to Jᵀ r, (N, rows, m)."""
+    """Return the share of each row in Jᵀ r, (N, rows, m)."""
     at = machine.closure(slots, pose, q)
     return at.by_step * at.residual[..., None]
 

@@ -26,7 +26,7 @@ def readings(
     columns: Int32Array | None,
     sizes: FloatArray,
 ) -> tuple[FloatArray, FloatArray, FloatArray | None]:
-    """As `pkmcal.core.machine.Machine.readings`; the rows of actuators come first.
+    """Compute readings as `pkmcal.core.machine.Machine.readings`; actuators' rows come first.
 
     Parameters
     ----------

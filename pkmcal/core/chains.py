@@ -27,7 +27,7 @@ GROUPS = {"spatial": 6, "planar": 3, "spherical": 3}  # pose maps of chains, and
 
 @dataclass(frozen=True, eq=False)
 class ChainLayout:
-    """What of a machine of chains does not change with its numbers.
+    """The layout of a machine of chains: what does not change with its numbers.
 
     Joints count once where chains share them. Places are those of numbers in the geometry.
 
@@ -96,24 +96,24 @@ class ChainLayout:
 
     @property
     def shared(self) -> int:
-        """How many passive joints are in several chains."""
+        """Number of passive joints that are in several chains."""
         return int((self._in_several & (self.coordinate >= 0)).sum())
 
     @property
     def _chain(self) -> IntArray:
-        """Of each member the chain."""
+        """The chain of each member."""
         return np.repeat(np.arange(len(self.ball)), np.diff(self.first))
 
     @property
     def _in_several(self) -> BoolArray:
-        """Of each joint whether it is in several chains."""
+        """Mask of joints that are in several chains."""
         of = self._chain
         users = [len(set(of[self.member == joint].tolist())) for joint in range(len(self.place))]
         return np.array(users) > 1
 
     @property
     def steps(self) -> FloatArray:
-        """By how much each number changes where effects are found by differences, mm and rad."""
+        """Return steps of each number for differences, mm and rad."""
         found = np.full(self.numbers, _STEP)
         for place in (self.place, self.end_place, self.ball_place[self.ball != 0]):
             found[np.unique(place)[:, None] + np.arange(3)] *= self.length
@@ -123,12 +123,12 @@ class ChainLayout:
 
     @property
     def passive(self) -> int:
-        """How many joints no actuator moves."""
+        """Number of joints that no actuator moves."""
         return int((self.coordinate >= 0).sum())
 
     @property
     def loose(self) -> bool:
-        """Whether a chain that shares a joint has more joints than rows: others must hold it."""
+        """True if a chain that shares a joint has more joints than rows: others must hold it."""
         more = np.diff(self.first) > self._closing
         return bool((self._in_several[self.member] & more[self._chain]).any())
 
@@ -139,7 +139,7 @@ class ChainLayout:
 
     @property
     def rows(self) -> int:
-        """How many rows the chains leave when each has eliminated the passive joints of its own."""
+        """Number of rows left when each chain has eliminated the passive joints of its own."""
         own = self.coordinate[self.member] >= self.shared
         return int(self._closing.sum() - own.sum())
 
@@ -229,7 +229,7 @@ class ChainMachine(CoreMachine):
         )  # fmt: skip
 
     def turns(self, slots: FloatArray) -> FloatArray:
-        """How far each actuator goes in a whole turn, (n,); infinite where it is no angle."""
+        """Return the way of each actuator in a whole turn, (n,); infinite where it is no angle."""
         out = np.full(self.actuators, np.inf)
         gain = slots.ravel()[self.layout.drive_place + 1]
         out[self._angles] = 2 * np.pi / np.abs(gain[self._angles])
@@ -246,20 +246,20 @@ class ChainMachine(CoreMachine):
         return self, slots, q
 
     def drives(self, slots: FloatArray, q: FloatArray) -> FloatArray:
-        """What the actuators read with gain and offset, (N, n)."""
+        """Return the drives' coordinates with gain and offset, (N, n)."""
         place, numbers = self.layout.drive_place, slots.reshape(-1, slots.shape[-1])
         found: FloatArray = numbers[:, place + 1] * q + numbers[:, place]
         return found
 
     @property
     def turning(self) -> BoolArray:
-        """Which actuators are angles, (n,)."""
+        """Mask of actuators that are angles, (n,)."""
         found = np.zeros(self.actuators, dtype=bool)
         found[self._angles] = True
         return found
 
     def drives_at(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
-        """What the actuators read at poses (N, 6) with gain and offset, (N, n)."""
+        """Return the actuators' readings at poses (N, 6), with gain and offset, (N, n)."""
         return self.drives(slots, self.inverse(slots, pose))
 
     def slopes(self, slots: FloatArray, q: FloatArray) -> FloatArray:
@@ -267,7 +267,7 @@ class ChainMachine(CoreMachine):
         return np.tile(slots.ravel()[self.layout.drive_place + 1], (len(q), 1))
 
     def at_drives(self, slots: FloatArray, way: FloatArray) -> FloatArray:
-        """What the actuators read (N, n) at q̃ (N, n)."""
+        """Return the actuators' readings (N, n) at q̃ (N, n)."""
         place, numbers = self.layout.drive_place, slots.reshape(-1, slots.shape[-1])
         q: FloatArray = (way - numbers[:, place]) / numbers[:, place + 1]
         return q
@@ -336,7 +336,7 @@ class ChainMachine(CoreMachine):
 
     @property
     def reading_rows(self) -> IntArray:
-        """Which row of `readings` is that of each actuator's coordinate."""
+        """The row of `readings` of each actuator's coordinate."""
         return np.arange(self.actuators)
 
     def rates(

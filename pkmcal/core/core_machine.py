@@ -1,4 +1,4 @@
-"""What machines of limbs and of chains have in common in the core: rows, angles, threads."""
+"""The common part of machines of limbs and of chains in the core: rows, angles, threads."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _WHOLE = 5e-3  # of a turn: by so much gains that were identified differ from on
 
 
 def whole_turn(gains: FloatArray) -> float:
-    """How far an actuator goes until limbs with these gains are where they were, rad.
+    """Return the way of an actuator until limbs with these gains are where they were, rad.
 
     Infinite where no such way is known.
     """
@@ -81,7 +81,7 @@ class CoreMachine(ABC):
 
     @property
     def turns_freely(self) -> bool:
-        """Whether its pose map has every rotation, which two triples of angles name."""
+        """True if the pose map has every rotation, so that two triples of angles name each."""
         return {"alpha", "beta", "gamma"} <= set(self._free)
 
     def as_written(self, pose: FloatArray, rates: FloatArray, axis: int) -> FloatArray:
@@ -101,27 +101,27 @@ class CoreMachine(ABC):
         return rates
 
     def with_tolerance(self: M, closure_tolerance: float) -> M:
-        """The same with another `closure_tolerance`, mm."""
+        """Return a copy of the machine with another `closure_tolerance`, mm."""
         other = copy(self)
         other.struct = ffi.new(ffi.typeof(self.struct), self.struct[0])
         other.struct.closure_tolerance = closure_tolerance
         return other
 
     def approaching(self: M, approach: FloatArray) -> M:
-        """The same with actuators that come from a direction, (n,) or (N, n): without laws it."""
+        """Return the machine for actuators that come from a direction, (n,) or (N, n): itself."""
         return self
 
     def tensioned(self: M, tension: FloatArray) -> M:
-        """The same with tensions of what actuators drive, (n,) or (N, n): without laws it."""
+        """Return the machine under tensions of actuators, (n,) or (N, n): itself, without laws."""
         return self
 
     def of_rows(self: M, rows: IntArray) -> M:
-        """The same with the state that it has in some rows of a call: without laws it has none."""
+        """Return the machine with its state in some rows of a call: itself, without laws."""
         return self
 
     @abstractmethod
     def turns(self, slots: FloatArray) -> FloatArray:
-        """How far each actuator goes in a whole turn, (n,); infinite where it is no angle."""
+        """Return the way of each actuator in a whole turn, (n,); infinite where it is no angle."""
 
     @abstractmethod
     def reference(self, slots: FloatArray) -> FloatArray:
@@ -134,7 +134,7 @@ class CoreMachine(ABC):
     @property
     @abstractmethod
     def turning(self) -> BoolArray:
-        """Which drives are angles, (drives,)."""
+        """Mask of drives that are angles, (drives,)."""
 
     @abstractmethod
     def drives_at(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
@@ -142,7 +142,7 @@ class CoreMachine(ABC):
 
     @abstractmethod
     def slopes(self, slots: FloatArray, q: FloatArray) -> FloatArray:
-        """How far the drives go by their actuators at coordinates (N, n), (N, drives)."""
+        """Differentiate the drives by their actuators at coordinates (N, n), (N, drives)."""
 
     @abstractmethod
     def at_drives(self, slots: FloatArray, way: FloatArray) -> FloatArray:

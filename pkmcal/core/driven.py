@@ -63,23 +63,23 @@ class DrivenMachine(CoreMachine):
 
     @property
     def struct(self) -> Any:
-        """Of C, of the machine within."""
+        """C struct of the machine within."""
         return self.inner.struct
 
     def with_tolerance(self, closure_tolerance: float) -> DrivenMachine:
-        """The same with another `closure_tolerance`, mm."""
+        """Return a copy of the machine with another `closure_tolerance`, mm."""
         return self._with(inner=self.inner.with_tolerance(closure_tolerance))
 
     def approaching(self, approach: FloatArray) -> DrivenMachine:
-        """The same with actuators that come from a direction, (n,) or (N, n)."""
+        """Return the machine for actuators that come from a direction, (n,) or (N, n)."""
         return self._with(approach=approach)
 
     def tensioned(self, tension: FloatArray) -> DrivenMachine:
-        """The same with tensions of what actuators drive, (n,) or (N, n)."""
+        """Return the machine under tensions of what the actuators drive, (n,) or (N, n)."""
         return self._with(tension=tension)
 
     def of_rows(self, rows: IntArray) -> DrivenMachine:
-        """The same with the state of some rows of a call."""
+        """Return the machine with its state in some rows of a call."""
         state = {"approach": self.approach, "tension": self.tension}
         batches = {name: each for name, each in state.items() if each is not None and each.ndim > 1}
         return self._with(**{name: each[rows] for name, each in batches.items()})
@@ -101,7 +101,7 @@ class DrivenMachine(CoreMachine):
 
     @property
     def turning(self) -> BoolArray:
-        """Which drives are angles, (drives,)."""
+        """Mask of drives that are angles, (drives,)."""
         return np.array([drive.angle for drive in self.laws.drives])
 
     def drives_at(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
@@ -109,7 +109,7 @@ class DrivenMachine(CoreMachine):
         return self.inner.drives_at(self._bare(slots), pose)
 
     def slopes(self, slots: FloatArray, q: FloatArray) -> FloatArray:
-        """How far the drives go by their actuators at readings (N, n), (N, drives)."""
+        """Differentiate the drives by their actuators at readings (N, n), (N, drives)."""
         return self.ways(slots, q).slope
 
     def bare(self, slots: FloatArray, q: FloatArray) -> tuple[AnyMachine, FloatArray, FloatArray]:
@@ -154,17 +154,17 @@ class DrivenMachine(CoreMachine):
         return np.ascontiguousarray(self._mean(readings))
 
     def _mean(self, each: FloatArray) -> FloatArray:
-        """Of drives (N, drives, ...) that share an actuator the mean, (N, n, ...)."""
+        """Average drives (N, drives, ...) that share an actuator, (N, n, ...)."""
         return np.stack([each[:, drives].mean(axis=1) for drives in self._driven], axis=1)
 
     def _sum(self, each: FloatArray) -> FloatArray:
-        """Of drives (..., drives) that share an actuator the sum, (..., n)."""
+        """Sum drives (..., drives) that share an actuator, (..., n)."""
         return np.stack([each[..., drives].sum(axis=-1) for drives in self._driven], axis=-1)
 
     # angles ---------------------------------------------------------------------------------------
 
     def turns(self, slots: FloatArray) -> FloatArray:
-        """How far each actuator goes in a whole turn, (n,); infinite where no such way is known."""
+        """Return the way of each actuator in a whole turn, (n,); infinite where none is known."""
         out = np.full(self.actuators, np.inf)
         for a, drives in enumerate(self._driven):
             if all(self.laws.drives[d].angle for d in drives):
@@ -264,7 +264,7 @@ class DrivenMachine(CoreMachine):
         return out
 
     def _sorted(self, columns: Int32Array) -> tuple[list[int], list[int], list[int]]:
-        """Which of the columns are the inner machine's, which those of laws, and their drives."""
+        """Sort the columns into those of the inner machine and those of laws, with their drives."""
         drives = [self.laws.drive_of(column) for column in columns.tolist()]
         of_laws = [i for i, d in enumerate(drives) if d >= 0]
         own = [i for i, d in enumerate(drives) if d < 0]
@@ -362,7 +362,7 @@ class DrivenMachine(CoreMachine):
     def ways_at(
         self, slots: FloatArray, pose: FloatArray, columns: Int32Array
     ) -> tuple[FloatArray, FloatArray]:
-        """How ways follow poses (N, 6), as `pkmcal.core.machine.Machine.ways_at`."""
+        """Differentiate drives by poses (N, 6), as `pkmcal.core.machine.Machine.ways_at`."""
         own, _, _ = self._sorted(columns)
         within = np.array([self._within(int(columns[i])) for i in own], dtype=np.int32)
         by_step, by_own = self._of_limbs.ways_at(self._bare(slots), pose, within)
@@ -371,7 +371,7 @@ class DrivenMachine(CoreMachine):
         return by_step, by_number
 
     def by_tension(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
-        """By how much less limbs read at poses (N, 6) per N of their tension, (N, drives)."""
+        """Return how much less limbs read at poses (N, 6) per N of tension, (N, drives)."""
         way, state = self._of_limbs.inverse(self._bare(slots), pose), self._state(len(pose))
         slope = self.laws.ways(slots, self.laws.readings(slots, way, *state), *state).slope
         return -self.laws.by_tension(slots, way, state[1]) / slope
@@ -402,7 +402,7 @@ class DrivenMachine(CoreMachine):
         return self.inner.step_twists(pose)
 
     def spheres(self, slots: FloatArray, q: FloatArray) -> FloatArray:
-        """What the limbs are at readings (N, n), as `pkmcal.core.machine.Machine.spheres`."""
+        """Return limbs' spheres at readings (N, n), as `pkmcal.core.machine.Machine.spheres`."""
         return self._of_limbs.spheres(self._bare(slots), self.drives(slots, q))
 
     def limbs(

@@ -36,7 +36,7 @@ class Fit(NamedTuple):
 
 
 class PoseEquations:
-    """Which equations belong to which of K poses, each with u unknowns.
+    """The equations of each of K poses, each pose with u unknowns.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ class PoseEquations:
         return found
 
     def left(self, by_unknown: FloatArray, part: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """What is left (M, c) of columns (E, c) when the poses have taken theirs.
+        """Project columns (E, c) onto what the poses' unknowns do not explain, (M, c).
 
         And how much the unknowns go against the columns for that (K, u, c); not finite where
         equations do not determine them.

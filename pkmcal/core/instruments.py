@@ -1,4 +1,4 @@
-"""What an instrument reads at given poses, as Python sees it of the compiled core."""
+"""Readings of instruments at given poses, by the compiled core."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _NONE = np.zeros(1)
 def points(
     pose: FloatArray, target: FloatArray, isa: int | None = None
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Where poses (N, 6) carry a target (3,) or (N, 3).
+    """Return the positions of a target (3,) or (N, 3) at poses (N, 6).
 
     Returns the points (N, 3) and their derivatives by the platform's twist (ω, v) (N, 3, 6) and by
     the target (N, 3, 3).
@@ -40,7 +40,7 @@ def distances(
     zero: FloatArray = _NONE,
     isa: int | None = None,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """How far targets of the platform are from anchors of the base less zeros, at poses (N, 6).
+    """Return distances of platform targets from base anchors, less zeros, at poses (N, 6).
 
     `target` and `anchor` are (3,) or (N, 3), `zero` is (1,) or (N, 1). Returns the distances (N,)
     and their derivatives by the platform's twist (ω, v) (N, 6), by the target (N, 3) and by the
@@ -54,7 +54,7 @@ def distances(
 def between(
     pose: FloatArray, other: FloatArray, target: FloatArray, isa: int | None = None
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """How far targets (3,) or (N, 3) at poses (N, 6) are from where they are at other ones.
+    """Return distances of targets (3,) or (N, 3) at poses (N, 6) from where they are at others.
 
     Returns the distances (N,) and their derivatives by both twists (ω, v) (N, 6) and by the target
     (N, 3).
@@ -77,7 +77,7 @@ def touched_points(
 def tilts(
     pose: FloatArray, mounting: FloatArray, up: FloatArray, isa: int | None = None
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """How far x and y of sensors point up, at poses (N, 6) of the platform that carries them.
+    """Return how far x and y of sensors point up, at poses (N, 6) of the platform.
 
     `mounting` are α β γ of the sensor on the platform, `up` the vertical in base axes, (3,) or
     (N, 3). Returns the angles (N, 2) and their derivatives by the turning of the platform, by the
@@ -94,7 +94,7 @@ def pixels(
     size: FloatArray = _NONE,
     isa: int | None = None,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Where cameras see corners (N, 3) of boards at poses (N, 6) in the camera's axes, px.
+    """Return pixels of corners (N, 3) of boards at poses (N, 6) in the camera's axes, px.
 
     `lens` is (9,) or (N, 9): fx fy cx cy k1 k2 p1 p2 k3; `size` is (1,) or (N, 1), by which a board
     is larger than stated. Returns u, v (N, 2), their derivatives by the board's twist (ω, v) at the

@@ -63,7 +63,7 @@ class Drive:
 
     @property
     def corrected(self) -> bool:
-        """Whether its inverse has no closed form."""
+        """True if the drive's inverse has no closed form."""
         return bool(self.harmonics) or self.table is not None
 
 
@@ -234,7 +234,7 @@ class Laws:
         return np.asarray(unpulled * numbers[:, self._stretch])
 
     def _longer(self, numbers: FloatArray, tension: FloatArray) -> FloatArray:
-        """How many times as long the ways are under a tension."""
+        """Return the factor by which a tension lengthens the ways."""
         longer: FloatArray = 1.0 + tension * numbers[:, self._stretch]
         return longer
 
@@ -264,7 +264,7 @@ class Laws:
         return q
 
     def returns(self, slots: FloatArray, d: int, turn: float) -> bool:
-        """Whether a law of an angle is the same after a turn of the reading, but for the turn."""
+        """Return whether a law of an angle repeats after a turn of the reading."""
         drive, numbers = self.drives[d], self._numbers(slots)[0]
         if not np.isfinite(turn) or numbers[self._base[d, [1, 3]]].any():
             return False
@@ -307,7 +307,7 @@ class Laws:
         return self._spans[1]
 
     def doubts(self, slots: FloatArray) -> dict[int, str]:
-        """Which drives have no inverse over their stroke, and why."""
+        """Name the drives without an inverse over their stroke, and the reasons."""
         found: dict[int, str] = {}
         numbers = self._numbers(slots)
         spans = self.spans(slots)
@@ -378,7 +378,7 @@ class Laws:
     # ----------------------------------------------------------------------------------------------
 
     def _alone(self, d: int) -> Laws:
-        """One drive, as if it were all."""
+        """Return the laws of one drive alone."""
         if d not in self._of_one:
             self._of_one[d] = Laws([replace(self.drives[d], actuator=0)], self._size)
         return self._of_one[d]
@@ -444,7 +444,7 @@ class Laws:
         return q
 
     def _most(self, numbers: FloatArray, d: int) -> float:
-        """How large the corrections of a drive can be."""
+        """Return a bound of the corrections of a drive."""
         drive = self.drives[d]
         values = numbers[0, [p for _, a, b in drive.harmonics for p in (a, b)]]
         most = float(np.abs(values).sum())

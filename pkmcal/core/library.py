@@ -196,7 +196,7 @@ def rows(function: str, *arrays: FloatArray, isa: int | None = None) -> list[Flo
 
 
 def processors() -> int:
-    """How many processors this process may use, or has, where the system knows no difference."""
+    """Return the number of processors this process may use, or has, where that is unknown."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

@@ -61,7 +61,7 @@ class Closure(NamedTuple):
 
 
 class Yielding(NamedTuple):
-    """What yields of a machine, and what pulls at its platform, for `Machine.forward_loaded`.
+    """Compliances of a machine and the loads at its platform, for `Machine.forward_loaded`.
 
     Attributes
     ----------
@@ -178,7 +178,7 @@ class Machine(CoreMachine):
         return q
 
     def turns(self, slots: FloatArray) -> FloatArray:
-        """How far each actuator goes until all its limbs are where they were, (n,).
+        """Return the way of each actuator until all its limbs are where they were, (n,).
 
         Infinite where it is no angle, or no such way is known.
         """
@@ -208,7 +208,7 @@ class Machine(CoreMachine):
 
     @property
     def turning(self) -> BoolArray:
-        """Which drives are angles, (limbs,)."""
+        """Mask of drives that are angles, (limbs,)."""
         return np.array(list(self.struct.angle[0 : self.struct.limbs]), dtype=bool)
 
     def drives_at(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
@@ -414,7 +414,7 @@ class Machine(CoreMachine):
     def ways_at(
         self, slots: FloatArray, pose: FloatArray, columns: Int32Array
     ) -> tuple[FloatArray, FloatArray]:
-        """How the ways of limbs follow poses (N, 6): by the map's step (N, limbs, m), mm and rad.
+        """Differentiate limbs' drives at poses (N, 6) by steps of the map, (N, limbs, m), mm, rad.
 
         And by the numbers at `columns` of the flattened slots (N, limbs, columns).
         """
@@ -428,12 +428,12 @@ class Machine(CoreMachine):
 
     @property
     def reading_rows(self) -> IntArray:
-        """Which row of `readings` is that of each limb's coordinate."""
+        """The row of `readings` of each limb's coordinate."""
         rows_of = [1 + int(row).bit_count() for row in self.struct.rows[0 : self.struct.limbs]]
         return np.concatenate([[0], np.cumsum(rows_of)[:-1]])
 
     def spheres(self, slots: FloatArray, q: FloatArray) -> FloatArray:
-        """What the limbs are at coordinates (N, n): (N, limbs, 7 + 3 AXES).
+        """Return the spheres of the limbs at coordinates (N, n): (N, limbs, 7 + 3 AXES).
 
         Platform joint (3), anchor (3), length in mm, and the axes (3 each), 0 where it has none;
         lengths are NaN in rows where a limb has no positive one.

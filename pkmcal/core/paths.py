@@ -15,7 +15,7 @@ ARRIVED, LOST, FAR = lib.PKM_ARRIVED, lib.PKM_LOST, lib.PKM_FAR
 
 
 class Paths(NamedTuple):
-    """Where complex solutions went.
+    """The ends of the paths of complex solutions.
 
     Attributes
     ----------

@@ -128,7 +128,7 @@ class PulleyMachine(Machine):
         return found
 
     def _over_pulleys(self, mine: FloatArray, end: FloatArray) -> tuple[FloatArray, ...]:
-        """What the core says of pulleys, (N, pulleys, ...)."""
+        """Compute pulleys in the core, (N, pulleys, ...)."""
         n, p = len(end), len(self._pulleys)
         numbers = mine[:, self._of_pulleys].reshape(n * p, mine.shape[2])
         joint = end[:, self._of_pulleys].reshape(n * p, 3) - numbers[:, 0:3]
@@ -188,7 +188,7 @@ class PulleyMachine(Machine):
     def _columns(
         self, columns: Int32Array, width: int
     ) -> tuple[Int32Array, IntArray, list[tuple[int, int, int]]]:
-        """What to ask of the machine of limbs for columns of the geometry.
+        """Return the columns to ask of the machine of limbs for columns of the geometry.
 
         The columns with the offset of the limb in place of numbers that lengthen its cable, rising
         and each once; where each of the columns is among them; and of those that are others here
@@ -365,7 +365,7 @@ class PulleyMachine(Machine):
         return super()._met(limbs, pose, q, q1, needed)
 
     def _bends(self, slots: FloatArray, cables: _Cables, motion: FloatArray) -> FloatArray:
-        """What cables accelerate by as their ends move, beyond what the spheres do (N, cables)."""
+        """Return accelerations of cables as their ends move, beyond the spheres', (N, cables)."""
         points = np.column_stack([slots[self._over, 3:6], np.ones(len(self._over))])
         speed = np.einsum("nij,kj->nki", motion[:, 1, :3], points)
         along = np.einsum("nki,nki->nk", speed, cables.pull)
@@ -376,5 +376,5 @@ class PulleyMachine(Machine):
 
 
 def has_bent(limbs: Sequence[dict[str, Any]]) -> bool:
-    """Whether one of a machine's limbs has a driver of `BENT`."""
+    """Return whether one of a machine's limbs has a driver of `BENT`."""
     return any(limb["driver"] in BENT for limb in limbs)

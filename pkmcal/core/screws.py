@@ -34,7 +34,7 @@ def pose(motion: FloatArray, isa: int | None = None) -> FloatArray:
 
 
 def exp_jacobian(twist: FloatArray, inverse: bool, isa: int | None = None) -> FloatArray:
-    """At twists (N, 6): how the motion follows the twist, or inversely, (N, 36)."""
+    """Differentiate motions by twists (N, 6), or inversely, (N, 36)."""
     name = "log_jacobian" if inverse else "exp_jacobian"
     return rows(name, twist, isa=isa)[0].reshape(-1, 36)
 
@@ -51,7 +51,7 @@ def frames(pose: FloatArray) -> FloatArray:
 
 
 class Links(NamedTuple):
-    """What is between the joints of an arm: shared by all rows, or of each row.
+    """The links between the joints of an arm: shared by all rows, or of each row.
 
     Attributes
     ----------

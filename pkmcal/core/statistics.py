@@ -19,7 +19,7 @@ REACH = 8.0  # standard deviations, to either side of the mean, that the bins co
 
 @dataclass(frozen=True, eq=False)
 class Bins:
-    """Where the bins of k quantities are; beyond them one more bin on either side.
+    """The edges of bins of k quantities; beyond them is one more bin on either side.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class Bins:
 
 
 def pose_errors(poses: FloatArray, meant: FloatArray) -> FloatArray:
-    """How far poses (N, 6) are off (6,), and the distance of the positions: (7, N).
+    """Return errors of poses (N, 6) in (6,) coordinates, and the distance: (7, N).
 
     Eq. 16; angles the short way round.
     """
@@ -54,7 +54,7 @@ def pose_errors(poses: FloatArray, meant: FloatArray) -> FloatArray:
 
 
 class Stream:
-    """What is kept of values (k, n): count, mean, spread, extremes, and counts in bins.
+    """Statistics of values (k, n): count, mean, spread, extremes, counts in bins.
 
     Parameters
     ----------
@@ -72,12 +72,12 @@ class Stream:
 
     @property
     def count(self) -> int:
-        """How many columns have been taken, without those that failed."""
+        """Number of columns that were taken, without those that failed."""
         return int(self._taken[0])
 
     @property
     def n_failed(self) -> int:
-        """How many columns had a number that is not finite."""
+        """Number of columns with a number that is not finite."""
         return int(self._taken[1])
 
     def add(self, values: FloatArray) -> None:

@@ -102,7 +102,7 @@ class Swarm:
 
     @property
     def positions(self) -> FloatArray:
-        """Where the particles are, a copy (particles, n)."""
+        """Positions of the particles, a copy (particles, n)."""
         positions: FloatArray = self._x.T.copy()
         return positions
 

@@ -1,4 +1,4 @@
-"""How wrong numbers that a fit held may be before its uncertainty is double what it says.
+"""Errors of numbers that a fit held at which its stated uncertainty is doubled.
 
 An error φ of held numbers moves the parameters by G K φ, with K the derivative of the whitened
 readings by them and G that of the parameters by the readings. Independent errors of deviation t add
@@ -53,7 +53,7 @@ class Breakeven:
 
 
 def breakeven(fit: Fit) -> tuple[Breakeven, ...]:
-    """How wrong held numbers may be: lengths, angles and ratios, as far as there are such.
+    """Return the errors of held numbers that double ±: lengths, angles and ratios.
 
     Nothing where equations are mixtures or the noise is not known.
     """
@@ -77,7 +77,7 @@ def breakeven(fit: Fit) -> tuple[Breakeven, ...]:
 
 
 def in_words(found: tuple[Breakeven, ...]) -> str:
-    """One sentence on all of them; "" without any."""
+    """Return one sentence on these errors; "" without any."""
     if not found:
         return ""
     return (
@@ -108,7 +108,7 @@ def _candidates(fit: Fit, robot: Calibratable) -> list[str]:
 
 
 def _twists(fit: Fit) -> FloatArray:
-    """How the platform moves with all numbers (6 N, p) at the poses of the fit, mm."""
+    """Return the platform's twists by all numbers (6 N, p) at the poses of the fit, mm."""
     end, robot = fit.end, fit.end.robot
     good = end.status == 0
     twists = robot.error_twists(end.pose[good], end.actuators[good]).copy()

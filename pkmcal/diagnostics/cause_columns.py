@@ -1,4 +1,4 @@
-"""What causes that are not in the model would do to the readings: columns beside the design."""
+"""Columns, beside the design, of causes that are not in the model."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _LEAST_WAY = 1e-9  # of the machine's length, below which actuators have not mov
 
 
 class Cause(NamedTuple):
-    """One cause.
+    """A cause that is not in the model.
 
     Attributes
     ----------
@@ -270,5 +270,5 @@ def possible(fit: Fit) -> Iterator[tuple[Cause, Columns]]:
 
 
 def usable(end: Evaluation) -> bool:
-    """Whether all poses are solved."""
+    """Return whether all poses are solved."""
     return bool((end.status == 0).all())

@@ -1,4 +1,4 @@
-"""Which cause that is not in the model would explain what a fit leaves."""
+"""Tests of causes that are not in the model and would explain the residuals of a fit."""
 
 from __future__ import annotations
 

@@ -77,7 +77,7 @@ class Remedy:
         return {**arguments, self.argument: value}
 
     def _replaces(self, word: object) -> bool:
-        """Whether a word that the argument has is another loss: there is only one."""
+        """Return whether a word that the argument has is another loss: there is only one."""
         return self.argument == "loss" and {self.value, word} <= LIMITS.keys()
 
     @property
@@ -112,7 +112,7 @@ def _listed(value: Any) -> tuple[Any, ...]:
 
 @dataclass(frozen=True)
 class Said:
-    """What one check says of a calibration.
+    """The statement of one check about a calibration.
 
     Attributes
     ----------
@@ -175,5 +175,5 @@ class Check(Generic[F]):
 
 
 def at_most_one(finding: F | None) -> tuple[F, ...]:
-    """What `run` returns of a finding that there may be."""
+    """Return the findings of `run`, of which there is at most one."""
     return () if finding is None else (finding,)

@@ -1,4 +1,4 @@
-"""Whether machine, instrument or targets were elsewhere in the course of measuring."""
+"""Check whether machine, instrument or targets were elsewhere in the course of measuring."""
 
 from __future__ import annotations
 

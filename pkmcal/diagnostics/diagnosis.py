@@ -1,4 +1,4 @@
-"""What all checks say of one calibration, and which of them keep silent beside others."""
+"""Statements of all checks about one calibration; some keep silent beside others."""
 
 from __future__ import annotations
 
@@ -40,13 +40,13 @@ class Diagnosis:
         self._findings = findings
 
     def findings(self, name: str) -> tuple[Any, ...]:
-        """What a check saw, worth a word or not, and whatever other checks say."""
+        """Return the findings of all checks, also those that are not worth a word."""
         if name not in self._findings:
             self._findings[name] = tuple(self._checks[name].run(self._found))
         return self._findings[name]
 
     def said(self) -> tuple[Said, ...]:
-        """What the checks say, in their order."""
+        """Return the statements of the checks, in their order."""
         return tuple(said for check in self._checks.values() for said in self._said_by(check))
 
     def _said_by(self, check: Check[Any]) -> Iterator[Said]:

@@ -1,4 +1,4 @@
-"""Whether a target sits elsewhere than it is stated: a reflector badly seated, say.
+"""Check whether a target sits elsewhere than it is stated: a reflector badly seated, say.
 
 Where several known points of the platform are read, all of the residuals of one that is not where
 it should be point the same way on the platform. Poses do not show it: rows of a pose do not share
@@ -54,12 +54,12 @@ class DisplacedTarget:
 
     @property
     def found(self) -> bool:
-        """Whether it is displaced."""
+        """True if the target is displaced."""
         return self.chance < CHANCE
 
     @property
     def large(self) -> bool:
-        """Whether that is most of what is left."""
+        """True if the displacement is most of the residuals."""
         return self.found and self.share > _LARGE
 
     def __str__(self) -> str:
@@ -148,7 +148,7 @@ def _name(fit: Fit, place: FloatArray, rows: list[BoolArray]) -> str:
 
 
 def _columns(fit: Fit, mine: list[BoolArray]) -> Columns:
-    """How equations change with the place of the target of these rows of each set."""
+    """Differentiate equations by the place of the target of these rows of each set."""
 
     def change(i: int, rows: slice, seen: Predicted) -> FloatArray:
         if "target" not in seen.by:

@@ -1,4 +1,4 @@
-"""Whether poses that were measured again moved meanwhile: drift of machine or instrument."""
+"""Check whether poses that were measured again moved meanwhile: drift of machine or instrument."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _HOUR = 3600.0  # s
 
 @dataclass(frozen=True)
 class Drift:
-    """How far repeated poses moved, each from its first visit to its last.
+    """Drift of repeated poses, each from its first visit to its last.
 
     Attributes
     ----------
@@ -58,12 +58,12 @@ class Drift:
 
     @property
     def found(self) -> bool:
-        """Whether they drift."""
+        """True if repeated poses drift."""
         return self.chance < CHANCE
 
     @property
     def large(self) -> bool:
-        """Whether they drift by more than single visits scatter."""
+        """True if repeated poses drift by more than single visits scatter."""
         return self.found and float(np.linalg.norm(self.shift)) > float(
             np.linalg.norm(self.scatter)
         )

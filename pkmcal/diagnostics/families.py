@@ -1,4 +1,4 @@
-"""Whether lengths or angles of a set are off while the others fit.
+"""Check whether lengths or angles of a set are off while the others fit.
 
 Without a stated sigma the noise of each family is what its residuals are: angles of other rows, in
 another order or a column that was not filled would count as an instrument with a noise of degrees.
@@ -116,7 +116,7 @@ def _median(residual: FloatArray) -> float:
 
 
 def _follows(residual: FloatArray, predicted: FloatArray) -> float:
-    """How likely residuals (N, k) would follow so well from what they are of, if they were noise.
+    """Return the chance of noise to follow what residuals (N, k) are of as well as these do.
 
     By a regression on its values, their squares and products; 1 where there are too few rows.
     """

@@ -1,4 +1,4 @@
-"""Whether a calibration was worth it: how the misfit changed."""
+"""Check whether a calibration was worth it: how the misfit changed."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def _little_gained(found: Solution) -> bool:
 
 
 def _other_causes(found: Solution) -> str:
-    """What else the misfit may come of where the calibration hardly lowered it."""
+    """Name other causes of a misfit that the calibration hardly lowered."""
     if not found.fit.uncertainty.equations.blocks.unstated.any():
         return "numbers that are not free are wrong, or sigma is too small"
     if np.isfinite(found.lack_of_fit_chance):

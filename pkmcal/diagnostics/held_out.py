@@ -1,4 +1,4 @@
-"""What points that were held out say against the fit."""
+"""Evidence of held-out points against the fit."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def _contradiction(found: Solution, several: tuple[HeldFamily, ...]) -> str:
 
 
 def _compared(several: tuple[HeldFamily, ...]) -> str:
-    """What came out of each family, and what is expected."""
+    """Compare the residuals of each family with what is expected."""
     parts = []
     for each in several:
         off, unit = displayed(each.rms, each.family.unit)
@@ -72,7 +72,7 @@ def _drop(found: Solution, rows: tuple[int, ...]) -> tuple[Remedy, ...]:
 
 
 def _moved(found: Solution) -> tuple[tuple[Moved, ...], ...]:
-    """What moved; nothing where points were drawn, or agree with a fit of spare equations."""
+    """Name what moved; nothing where points were drawn, or agree with a fit of spare equations."""
     later, end, sure = found.holdout_later, found.holdout_end, found.fit.uncertainty
     if not found.holdout_contradicts and sure.fit.freedom >= FEW:
         return ()
@@ -107,7 +107,7 @@ def _size(shift: float, sigma: float, unit: str) -> str:
 
 
 def _fitted_again(found: Solution) -> int:
-    """How many rows were held out at actuators where others were fitted."""
+    """Count the rows that were held out at actuators where others were fitted."""
     held = [row.tobytes() for data in found.holdout_data for row in _commands(data.measured)]
     sought = set(held)
     fitted = {

@@ -1,4 +1,4 @@
-"""Whether readings were taken before the machine had arrived, or after it left, or logs differ.
+"""Readings before the machine had arrived, or after it left, and logs that are late: a test.
 
 Such a reading is off where the machine stops by a share of the way from the pose before, or to the
 next. One number says how much; a score test of it, through the machine's own derivatives, sees what
@@ -24,7 +24,7 @@ CHANCE = 1e-3  # below which readings are late
 
 @dataclass(frozen=True)
 class Late:
-    """By how much readings are late, or after the machine left.
+    """The lag of readings: before the machine arrived, or after it left.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class Late:
 
     @property
     def found(self) -> bool:
-        """Whether one of them is of another moment."""
+        """True if readings and actuators are of different moments."""
         return self.chance < CHANCE
 
     def __str__(self) -> str:
@@ -97,7 +97,7 @@ def late(found: Solution) -> Late | None:
 
 
 def _columns(found: Solution, place: FloatArray) -> Columns:
-    """How equations change with the share of the way to places (N, n) that readings are off.
+    """Differentiate equations by the share of the way to places (N, n) that readings are off.
 
     The places are actuator readings.
     """

@@ -1,4 +1,4 @@
-"""Whether the numbers of a drive law are needed: an F test of each kind of them against 0."""
+"""Check whether the numbers of a drive law are needed: an F test of each kind of them against 0."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class LawTest:
 
     @property
     def needed(self) -> bool:
-        """Whether the measurements need these numbers."""
+        """True if the measurements need the law's numbers."""
         return self.chance < NEEDED
 
     def __str__(self) -> str:
@@ -118,7 +118,7 @@ def _groups(geometry: Geometry, free: Sequence[str]) -> list[tuple[str, ...]]:
 
 
 def _kind(slot: str) -> str:
-    """What a slot is of a law: a cosine and its sine are one, so is a whole table."""
+    """Name the kind of a law's slot: a cosine and its sine are one, so is a whole table."""
     match = _KEY.match(slot)
     if match is None:
         return ""

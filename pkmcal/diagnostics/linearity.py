@@ -1,4 +1,4 @@
-"""Whether the machine is linear over what the parameters are uncertain by.
+"""Check whether the machine is linear over what the parameters are uncertain by.
 
 Standard deviations and intervals are those of the linear machine at the solution. Where a
 combination is hardly determined they can carry the machine so far that they say nothing: the misfit

@@ -1,4 +1,4 @@
-"""Whether what the machine carried shows in residuals, and whether compliances are believable."""
+"""Tests for loads that show in residuals, and for compliances that are not believable."""
 
 from __future__ import annotations
 
@@ -55,12 +55,12 @@ def _ignored(found: Solution) -> tuple[IgnoredLoads, ...]:
 
 
 def _of_loads(robot: Calibratable) -> Elasticity:
-    """What of a machine follows loads first: legs and screws, or joints of an arm."""
+    """Name what follows loads first in a machine: legs and screws, or joints of an arm."""
     return _OF_JOINTS if isinstance(robot, ArmMachine) else _OF_LEGS
 
 
 def _by_compliances(fit: Fit, robot: Calibratable) -> Columns:
-    """How equations change with compliances that are held at 0."""
+    """Differentiate equations by compliances that are held at 0."""
     _, soft, freed = _of_loads(robot).of_machine(robot)
     places = [soft.geometry.names.index(name) for name in freed]
     table = fit.equations.table

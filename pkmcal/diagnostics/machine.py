@@ -1,4 +1,4 @@
-"""Whether what was found is a machine as it can be: sizes, strokes, assembly modes."""
+"""Check whether what was found is a machine as it can be: sizes, strokes, assembly modes."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class DistantPoint(NamedTuple):
 
 
 def _platform_size(found: Solution) -> float:
-    """How far from its origin a point of the platform may be, mm."""
+    """Return the largest distance of a platform point from its origin that is possible, mm."""
     robot = found.fit.parameters.robot
     reach = float(np.linalg.norm(found.fit.end.pose[:, :3], axis=1).max())
     geometry = robot.geometry
@@ -83,7 +83,7 @@ def _distant_text(found: Solution, point: DistantPoint) -> str:
 
 
 def _shrunk(found: Solution) -> tuple[float, ...]:
-    """By which share poses lie closer together, where touches alone say how large the machine is.
+    """Return the share by which poses moved closer, where touches alone state the size.
 
     Touches of a point, a line or a plane do not: a smaller machine makes all their misfits smaller.
     """
@@ -159,7 +159,7 @@ def _drives(evaluation: Evaluation) -> FloatArray:
 
 
 def _beyond(robot: Robot, drive: FloatArray) -> BoolArray:
-    """Which drives (K, limbs) are beyond their strokes by more than errors explain."""
+    """Mark the drives (K, limbs) that are beyond their strokes by more than errors explain."""
     strokes = [limb.stroke or (-np.inf, np.inf) for limb in robot.model.limbs]
     drive = drive[:, : len(strokes)]  # without the tail
     low, high = np.array(strokes).T

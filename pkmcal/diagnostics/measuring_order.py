@@ -1,4 +1,4 @@
-"""Whether what a fit leaves changes with the order of measuring, as where something moved."""
+"""Check whether what a fit leaves changes with the order of measuring, as where something moved."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _MOST = 0.5  # of the residuals' variance, from which they are little else
 
 @dataclass(frozen=True)
 class MeasuringOrder:
-    """How residuals follow the order in which was measured, of the series that does so most.
+    """Change of residuals with the order of measuring, in the series where it is largest.
 
     A series are the rows of one file, or of one session or touched point in it, in the order of the
     column `time`, or of the rows where there is none.
@@ -65,12 +65,12 @@ class MeasuringOrder:
 
     @property
     def found(self) -> bool:
-        """Whether residuals follow the order."""
+        """True if residuals follow the order."""
         return self.chance < CHANCE
 
     @property
     def large(self) -> bool:
-        """Whether that is most of what they are."""
+        """True if the order of measuring explains most of the residuals."""
         return self.found and self.share > _MOST and not self.by_place
 
     def _counted(self) -> list[int]:
@@ -140,7 +140,7 @@ def measuring_order(fit: Fit, odd: Collection[int]) -> MeasuringOrder | None:
 
 
 def _place_explains(fit: Fit, visits: _Visits, series: int) -> bool:
-    """Whether nothing is left of the course beside a quadratic function of the place."""
+    """Return whether nothing is left of the course beside a quadratic function of the place."""
     place = fit.end.pose[np.concatenate(fit.equations.table.pose_of)[visits.place], :3]
     place = (place - place.mean(axis=0)) / max(float(np.ptp(place, axis=0).max()), 1e-300)
     products = [place[:, i] * place[:, j] for i in range(3) for j in range(i, 3)]
@@ -220,13 +220,13 @@ def _series(datasets: Sequence[FitData]) -> tuple[IntArray, tuple[str, ...]]:
 
 
 def _components(fit: Fit) -> dict[str, str]:
-    """What was read, of all sets, and its unit."""
+    """Return the components that were read, of all sets, and their unit."""
     sets = fit.uncertainty.equations.table.sets
     return {n: u for m in sets for n, u in zip(m.components, m.units, strict=True)}
 
 
 def _by_component(fit: Fit) -> FloatArray:
-    """How equations (M, k) change if what was read does by 1, mm or rad."""
+    """Differentiate equations (M, k) by what was read, by component, mm or rad."""
     equations = fit.uncertainty.equations
     numbers = {n: k for k, n in enumerate(_components(fit))}
     parts = []
@@ -237,7 +237,7 @@ def _by_component(fit: Fit) -> FloatArray:
 
 
 def _tested(visits: _Visits, series: int) -> tuple[int, int, Course] | None:
-    """Which series, its first visit, and its course; None where it is too short."""
+    """Return the tested series, its first visit and its course; None where it is too short."""
     own = np.flatnonzero(visits.series == series)
     if len(own) < _FEWEST:
         return None

@@ -1,4 +1,4 @@
-"""Which parameters moved between the fitted measurements and others that were held out."""
+"""Parameters that moved between the fitted measurements and others that were held out."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class Moved:
 
     @property
     def per_session(self) -> str:
-        """What finds such numbers anew in each session: a wildcard for `identify`."""
+        """The wildcard for `identify` that finds these numbers anew in each session."""
         first, point, rest = self.names[0].partition(".")
         if first.startswith("joint"):
             return f"joint*.{rest}"

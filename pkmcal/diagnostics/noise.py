@@ -1,4 +1,4 @@
-"""Whether residuals are what the stated sigma says, and enough of them show the noise."""
+"""Check whether residuals are what the stated sigma says, and enough of them show the noise."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def _too_noisy(found: Solution) -> tuple[float, ...]:
 
 
 def _too_noisy_text(found: Solution, scale: float) -> str:
-    """What is wrong and what helps: repeats decide between the two causes."""
+    """Describe what is wrong and what helps: repeats decide between the two causes."""
     wrong = f"residuals are {scale:.3g} times what sigma says"
     scatter = found.fit.uncertainty.repeats().scatter
     if scatter**2 > NOISY:
@@ -127,7 +127,7 @@ def _stated(found: Solution) -> bool:
 
 
 def _widened(found: Solution) -> tuple[float, ...]:
-    """By how much ± are wider than sigma alone would make them, where that is worth a word."""
+    """Return the factor by which ± exceed those of sigma alone, where that is worth a word."""
     scale = found.fit.uncertainty.covariance.scale
     least = {"classical": 1.0, "cluster": _LARGE}[found.covariance_rule]
     return at_most_one(scale if _stated(found) and scale > least else None)

@@ -1,4 +1,4 @@
-"""Whether what was known before agrees with the measurements."""
+"""Check whether what was known before agrees with the measurements."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def _contradicted(found: Solution) -> tuple[PriorTest, ...]:
 
 
 def _contradicted_text(found: Solution, test: PriorTest) -> str:
-    """How likely, which numbers are pulled most, and how wide a prior would agree."""
+    """State the chance, the numbers that are pulled most, and a width that would agree."""
     pulls, stated = np.nan_to_num(test.pulls), found.fit.parameters.prior_names
     worst = [k for k in largest_first(np.abs(pulls), _ALIKE)[:3] if abs(pulls[k]) > _PULLED]
     shown = ", ".join(f"{stated[k]} {abs(pulls[k]):.1f}" for k in worst)

@@ -1,4 +1,4 @@
-"""By how much numbers of a machine can be others than found, whatever a linear fit makes of them.
+"""Bounds on a machine's numbers beyond those of a linear fit.
 
 Touches of a place fit any machine that is small enough: what keeps its size is a known distance.
 Numbers that are found without that, for some of the rows or for another reading of it, shrink the

@@ -1,4 +1,4 @@
-"""What readings show of themselves, and poses that turn too little for what has to be found."""
+"""Doubts about readings by themselves, and poses that turn too little for what is free."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def hardly_turned(found: Solution) -> HardlyTurned | None:
 
 
 def _spread(angles: FloatArray) -> FloatArray:
-    """By how much orientations (N, 3) differ about three axes, rms, the largest first."""
+    """Return the rms spread of orientations (N, 3) about three axes, the largest first."""
     off = orientation.between(angles, np.repeat(angles[:1], len(angles), axis=0))
     size: FloatArray = np.linalg.svd(off - off.mean(axis=0), compute_uv=False)
     spread: FloatArray = size / np.sqrt(len(angles))
@@ -87,7 +87,7 @@ def _doubted(found: Solution) -> tuple[str, ...]:
 
 
 def scale_by_one(found: Solution) -> str | None:
-    """What alone tells how large the machine is, in a word; None where something else does."""
+    """Name the one thing that tells how large the machine is; None where there are several."""
     machine = found.fit.end.robot
     by = {m.instrument.scaled_by for m in found.fit.uncertainty.equations.table.sets}
     if len(by) != 1 or "" in by:

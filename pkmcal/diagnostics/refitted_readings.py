@@ -80,7 +80,7 @@ class _Compared:
         return column_basis(self.design)
 
     def residual(self, i: int, reading: Measurements) -> FloatArray:
-        """Of these equations (m,), where set `i` reads so and the others as given."""
+        """Compute these residuals (m,) with other readings of set `i`."""
         sure, end = self.found.fit.uncertainty, self.found.fit.end
         parts = list(end.residuals)
         parts[i] = reading.instrument.difference(reading.values, end.predicted[i])
@@ -88,7 +88,7 @@ class _Compared:
 
     @cached_property
     def reach(self) -> FloatArray:
-        """How far numbers (n, r) go along the basis, of how far they can be off."""
+        """Return the way of numbers (n, r) along the basis in units of how far they can be off."""
         sure = self.found.fit.uncertainty
         changes: FloatArray = reach(sure) @ orthonormal(self.design)
         return changes
@@ -115,14 +115,14 @@ class _Compared:
         return likelihood
 
     def _likelihood(self, left: FloatArray) -> tuple[float, FloatArray]:
-        """Its logarithm, up to a constant, and the deviation (m,) of each equation's group."""
+        """Return the log-likelihood up to a constant, and each equation's group deviation (m,)."""
         count = np.bincount(self.group)
         variance = np.maximum(np.bincount(self.group, left**2) / count, 1e-300)
         return float(-0.5 * (count * np.log(variance)).sum()), np.sqrt(variance)[self.group]
 
 
 def _fills(given: Measurements, other: Measurements) -> bool:
-    """Whether a column of nothing but 0, which takes no part, would have numbers."""
+    """Return whether a column of nothing but 0, which takes no part, would have numbers."""
     before, after = (m.values.reshape(len(m), -1) for m in (given, other))
     still = (before == 0.0).all(axis=0)
     return bool(np.any(after[:, still] != 0.0))

@@ -1,4 +1,4 @@
-"""How good a calibration is where it was not measured: regions, sessions and poses left out."""
+"""Accuracy where nothing was measured: regions, sessions and poses left out."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class CrossValidation:
 
     @property
     def worse(self) -> bool:
-        """Whether blocks that are left out are worse than expected."""
+        """True if blocks that are left out are worse than expected."""
         return self.chance < CHANCE and self.ratio > _RATIO
 
 

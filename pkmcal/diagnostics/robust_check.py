@@ -1,4 +1,4 @@
-"""Whether a few rows carry a least-squares fit: a robust fit beside it."""
+"""Check whether a few rows carry a least-squares fit: a robust fit beside it."""
 
 from __future__ import annotations
 
@@ -44,12 +44,12 @@ class RobustCheck:
 
     @property
     def disagrees(self) -> bool:
-        """Whether some rows disagree with the rest, more than by chance."""
+        """True if some rows disagree with the rest, more than by chance."""
         return self.ratio > max(DISAGREES, self.by_chance)
 
     @property
     def carried(self) -> bool:
-        """Whether they carry the least-squares fit off."""
+        """True if a few rows carry the least-squares fit off."""
         return self.ratio > CARRIED * max(self.by_chance / DISAGREES, 1.0)
 
 
@@ -102,7 +102,7 @@ def robust_check(fit: Fit) -> RobustCheck | None:
 def _rms_of_others(
     few: Equations, commanded: Equations, there: Evaluation, named: BoolArray
 ) -> float:
-    """How far off the rows are that are not named (N,), mm; closures where nothing was read."""
+    """Return distances (N,) of rows not named, mm; of closures where nothing was read."""
     if not few.whitening.any_read:
         poses = np.ones(len(there.pose), dtype=bool)
         poses[np.concatenate(few.table.pose_of)[named]] = False

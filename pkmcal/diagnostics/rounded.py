@@ -1,4 +1,4 @@
-"""What readings in steps show: nothing, too little, or where an instrument was at its stop."""
+"""Doubts from readings in steps: nothing measured, too few steps, an instrument at its stop."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _ROUNDED = 1e3  # times rounding errors of what is predicted
 
 
 def _nothing_measured(found: Solution) -> tuple[str, ...]:
-    """How exactly every reading is what the nominal machine shows, in words; () if some are not."""
+    """Describe how exactly every reading is the nominal machine's; () if some are not."""
     start, equations = found.fit.start, found.fit.equations
     if found.fit.uncertainty.mixed or not equations.whitening.any_read or not start.ok:
         return ()
@@ -52,7 +52,7 @@ def _nothing_measured(found: Solution) -> tuple[str, ...]:
 
 
 def _half(measured: Measurements, steps: FloatArray) -> FloatArray:
-    """How far rounding to steps (k,) moves each component (k,): of angles, all move a turn's."""
+    """Return the effect of rounding to steps (k,) on each component (k,): of angles, of a turn."""
     half = 0.5 * steps
     for family in measured.instrument.families:
         if family.unit == "rad":
@@ -76,7 +76,7 @@ def _shown(step: float, unit: str) -> tuple[float, str]:
 
 
 def _reach_of_actuators(found: Solution, at: Evaluation) -> list[FloatArray]:
-    """How far half a step of all actuators moves each reading (N, k) of each set."""
+    """Return how far half a step of all actuators moves each reading (N, k) of each set."""
     equations, units = found.fit.equations, at.robot.actuator_units
     read = equations.table.actuators
     half = np.array([0.5 * step_of(read[:, a], unit) for a, unit in enumerate(units)])
@@ -135,7 +135,7 @@ def _coarse_steps(found: Solution) -> Iterator[CoarseSteps]:
 
 
 def _alike(found: Solution, coarse: Coarse) -> bool:
-    """Whether rounding errors go together: they do not average out then."""
+    """Return whether rounding errors go together: they do not average out then."""
     if not coarse.residual < DITHERED * coarse.floor:
         return False  # noise spreads the readings over several steps
     start, end = (each.predicted[coarse.set] for each in (found.fit.start, found.fit.end))

@@ -1,4 +1,4 @@
-"""What would make measurements fit that do not: units, columns, rows, targets; found by trying."""
+"""Repairs of measurements that do not fit: units, columns, rows, targets; found by trials."""
 
 from __future__ import annotations
 

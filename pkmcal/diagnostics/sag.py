@@ -1,4 +1,4 @@
-"""Whether an arm sags: what sag gains where nothing was fitted, each pose left out in turn."""
+"""Test of sag of an arm: its gain where nothing was fitted, each pose left out in turn."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ NUMBERS = ("sag", "compliance")  # with which the names of sag begin
 
 
 class SagFinding(NamedTuple):
-    """What sag gains that a fit lacks.
+    """The gain by sag that a fit lacks.
 
     Attributes
     ----------
@@ -100,7 +100,7 @@ def _of_sag(fit: Fit) -> list[str]:
 
 
 def _lacking(found: Solution) -> tuple[LackingSag, ...]:
-    """What sag gains that the fit lacks, and how far it moves the numbers, in their ±."""
+    """Return the gain by sag that the fit lacks, and how far it moves the numbers, in their ±."""
     helps = sag_that_helps(found.fit)
     if helps is None:
         return ()
@@ -125,7 +125,7 @@ def _alike(fit: Fit, sag: Columns) -> Harmonics | None:
 
 
 def _in_it(found: Solution) -> tuple[Comparison, ...]:
-    """What the sag gains that was found."""
+    """Return the gain of the sag that was found."""
     names = _of_sag(found.fit)
     return at_most_one(compared_by_poses(found.fit, lacking=names) if names else None)
 

@@ -1,4 +1,4 @@
-"""What the measurements determine, and how the search for it ended."""
+"""Rank of the measurements, and how the search ended."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def _nothing_determined(found: Solution) -> bool:
 
 
 def _too_few(found: Solution) -> tuple[str, ...]:
-    """What there is too little of: poses, equations, or freedom; the sentence on it."""
+    """Name what there is too little of: poses, equations or freedom; and say so."""
     equations = found.fit.uncertainty.equations
     n, count = len(equations.parameters), int(equations.blocks.components.sum())
     read = equations.table.actuators
@@ -41,7 +41,7 @@ def _too_few(found: Solution) -> tuple[str, ...]:
 
 
 def _kept(found: Solution) -> int:
-    """How many combinations are so weak that the search kept what they had."""
+    """Return the number of weak combinations that the search kept as they were."""
     state = found.fit.estimate.state
     return state.determined.rank - state.fitted.rank
 

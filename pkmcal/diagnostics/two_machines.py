@@ -1,4 +1,4 @@
-"""Whether some of the rows are of another machine: sets, sessions, halves, rows in turn or in none.
+"""Rows of another machine: tests of sets, sessions, halves, alternating rows, any rows.
 
 Of rows in no order the division that fits best is tested. Its chance is that of one division times
 the number of all, so that the search for it makes no false alarm where noise is Gaussian.
@@ -54,12 +54,12 @@ class Apart:
 
     @property
     def large(self) -> bool:
-        """Whether it is more than a model that is slightly wrong shows."""
+        """True if the difference is larger than a slightly wrong model shows."""
         return self.residual < _LARGE and not self.elsewhere
 
     @property
     def found(self) -> bool:
-        """Whether it is of another machine."""
+        """True if the rows are of another machine."""
         return self.chance < CHANCE
 
     def __str__(self) -> str:
@@ -137,7 +137,7 @@ def _in_no_order(found: Solution, visits: Visits, use: IntArray, key: IntArray) 
 
 
 def _elsewhere(found: Solution, mine: BoolArray) -> bool:
-    """Whether rows (N,) were measured at other places or loads than the rest, or of other things.
+    """Return whether rows (N,) were measured at other places, loads or targets than the rest.
 
     Places and loads that differ explain much of who belongs to the group, linearly.
     """

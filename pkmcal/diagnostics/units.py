@@ -1,4 +1,4 @@
-"""Whether measurements are in the units and columns that they are said to be in."""
+"""Check whether measurements are in the units and columns that they are said to be in."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def _read_as(
 
 
 def _shrunk(given: Measurements, other: Measurements) -> float:
-    """By how much smaller measured numbers become, at most 1."""
+    """Return the factor by which measured numbers shrink, at most 1."""
     turning = given.instrument.turning  # orientations do not become small
     columns = slice(None) if turning is None else slice(0, turning)
     before, after = (
@@ -112,7 +112,7 @@ def _together(off: FloatArray) -> float:
 
 
 def _better_where_reached(trial: FloatArray, off: FloatArray) -> bool:
-    """Whether the rows that are reached as given speak for another reading, too.
+    """Return whether the rows that are reached as given speak for another reading, too.
 
     Their medians, for some rows may be solved in another assembly mode.
     """

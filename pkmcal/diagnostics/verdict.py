@@ -1,4 +1,4 @@
-"""Whether a calibration can be believed: the worst that any check says of it."""
+"""Check whether a calibration can be believed: the worst that any check says of it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ State = Literal["calibrated", "doubtful", "not calibrated"]
 
 @dataclass(frozen=True)
 class Verdict:
-    """Whether the result can be believed.
+    """Return whether the result can be believed.
 
     Attributes
     ----------

@@ -15,7 +15,7 @@ from pkmcal.statistics.linear_fit import numbered
 
 @dataclass(frozen=True, eq=False)
 class Visits:
-    """Where each fitted row (N,) stands in its series: the rows of a set, of a session in it.
+    """The place of each fitted row (N,) in its series: the rows of a set and session.
 
     Rows at the same actuators, one after the other, are one visit.
 

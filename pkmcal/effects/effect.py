@@ -16,7 +16,7 @@ from pkmcal.readings.unknowns import Dependence
 
 
 class Moved(NamedTuple):
-    """How an effect moves the platform in some rows.
+    """Motion of the platform by an effect in some rows.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class EffectOfRows(Protocol):
         rows: IntArray,
         numbers: Mapping[str, FloatArray],
     ) -> Moved:
-        """How the platform moves in some rows, by their numbers among those of the set.
+        """Compute the platform's motion in some rows, by their numbers among those of the set.
 
         `machine` is that of these rows, `pose` (N, 6) and `actuators` (N, n) are where it is.
         `numbers` are the arguments (M, w) of all rows of the set, by name.
@@ -55,7 +55,7 @@ class EffectOfRows(Protocol):
 
 
 class Effect(Protocol):
-    """What moves a machine off the pose that geometry alone gives."""
+    """An effect: it moves a machine off the pose that geometry alone gives."""
 
     @property
     def name(self) -> str:
@@ -65,7 +65,7 @@ class Effect(Protocol):
         """The effect in these rows; an error where what it needs was not read."""
 
     def dependences(self, measured: Any) -> Iterator[Dependence]:
-        """Its coefficients: arguments whose names no reading and no other effect has."""
+        """Return the effect's coefficients; no reading and no other effect has their names."""
 
 
 class Changed(NamedTuple):

@@ -65,7 +65,7 @@ class Elasticity:
 
     @property
     def option(self) -> str:
-        """As ``--effects`` has it."""
+        """The effect as a word of ``--effects``."""
         return f"elasticity={':'.join(words('numbers', self.numbers))}"
 
     def of_machine(self, machine: Any) -> Changed:

@@ -89,7 +89,7 @@ class Expansion:
 
 @dataclass(frozen=True, eq=False)
 class MachineExpansion:
-    """How the numbers of a machine grow with temperature.
+    """Growth of the numbers of a machine with temperature.
 
     Attributes
     ----------
@@ -110,7 +110,7 @@ class MachineExpansion:
     name: ClassVar[str] = "expansion"
 
     def dependences(self, measured: Measurements) -> Iterator[Dependence]:
-        """None: its coefficients are exact."""
+        """Return no coefficients: those of expansion are exact."""
         return iter(())
 
     def of_rows(self, measured: Measurements) -> Growth:
@@ -154,7 +154,7 @@ class Growth:
         rows: IntArray,
         numbers: Mapping[str, FloatArray],
     ) -> Moved:
-        """How the platform moves at poses (N, 6) of some rows."""
+        """Compute the motion of the platform at poses (N, 6) of some rows."""
         k = self.by_number.shape[1]
         grown = machine.geometry.values[:k] * self.by_number[rows]
         twists = machine.error_twists(pose, actuators)[..., :k]
@@ -169,7 +169,7 @@ def stated(effects: Sequence[object]) -> dict[str, float]:
 
 
 def has_lengths(robot: Calibratable) -> TypeGuard[Robot]:
-    """Whether the numbers of a machine are its lengths, so that it is known how they grow."""
+    """Return whether a machine's numbers are lengths, so that their growth is known."""
     return isinstance(robot, Robot) and robot.model.chains is None and not robot.model.driven
 
 
@@ -203,7 +203,7 @@ def temperatures(sets: Iterable[Measurements]) -> tuple[float, float] | None:
 
 
 def in_words(sets: Sequence[Measurements], given: Mapping[str, float], robot: Calibratable) -> str:
-    """What became of the temperatures that were read; "" where none were."""
+    """Say how the temperatures that were read were used; "" where none were."""
     between = temperatures(sets)
     if between is None:
         return ""

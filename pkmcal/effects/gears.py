@@ -54,7 +54,7 @@ class Harmonics:
 
     @property
     def option(self) -> str:
-        """As ``--effects`` has it."""
+        """The effect as a word of ``--effects``."""
         of = "" if self.joints == "all" else f"@{':'.join(map(str, _several(self.joints)))}"
         return f"harmonics={':'.join(f'{k:g}' for k in self._waves())}{of}"
 
@@ -120,7 +120,7 @@ class Coupling:
 
 @dataclass(frozen=True)
 class Backlash:
-    """How much further a joint is after a fall of its reading than after a rise.
+    """Backlash: the way of a joint after a fall of its reading beyond that after a rise.
 
     The measurements say from where each joint came (`Measurements.approach`).
 

@@ -25,12 +25,12 @@ _TYPICAL = 1e-3  # of a length: what moves a reading as much as 1 mm does at a d
 
 @dataclass(frozen=True)
 class InstrumentScale:
-    """By how much an instrument reads lengths too long, found with the geometry as ``scale``."""
+    """The scale error of an instrument for lengths, found with the geometry as ``scale``."""
 
     name: ClassVar[str] = SCALE
 
     def dependences(self, measured: Measurements) -> Iterator[Dependence]:
-        """One number, common to all rows."""
+        """Return the scale, one number common to all rows."""
         count = len(measured)
         number = Numbers(
             (SCALE,), ("1",), np.zeros(1, dtype=np.intp), np.zeros(1), np.array([_TYPICAL])
@@ -51,7 +51,7 @@ class InstrumentScale:
 
 @dataclass(frozen=True)
 class ScaledRows:
-    """How readings of one set follow the scale.
+    """Readings of one set as functions of the scale.
 
     Attributes
     ----------
@@ -72,7 +72,7 @@ class ScaledRows:
         rows: IntArray,
         numbers: Mapping[str, FloatArray],
     ) -> Moved:
-        """How the platform would have to move at poses (N, 6) for the same readings."""
+        """Compute the motion of the platform at poses (N, 6) that would give the same readings."""
         scale = numbers[SCALE][rows, 0]
         place = pose[:, :3]
         if self.anchored:

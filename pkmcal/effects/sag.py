@@ -64,7 +64,7 @@ class Sag:
 
     @property
     def option(self) -> str:
-        """As ``--effects`` has it."""
+        """The effect as a word of ``--effects``."""
         if self.tied:
             return "sag=tied"
         if self.joints == "main":

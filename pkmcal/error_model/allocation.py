@@ -224,7 +224,7 @@ def allocate_tolerance(
 
 
 def _used(variance: FloatArray, name: str) -> FloatArray:
-    """What one mm² or rad² of each joint adds to the variance that is limited, (N, g)."""
+    """Return what one mm² or rad² of each joint adds to the variance that is limited, (N, g)."""
     if name == DISTANCE:
         total: FloatArray = variance[:, :3].sum(axis=1)
         return total
@@ -253,7 +253,7 @@ class _Trial:
         )
 
     def apart(self, found: Tolerance) -> dict[str, float]:
-        """Of each limit, at the pose where 99.7 % of the machines use up most."""
+        """Return for each limit its value at the pose where 99.7 % of the machines use up most."""
         used = {}
         for name, limit in self.limits.items():
             if name == DISTANCE:
@@ -265,7 +265,7 @@ class _Trial:
         return used
 
     def together(self, sigma: FloatArray, seed: int) -> FloatArray:
-        """Of each limit, by each machine at the pose where it uses up most, (limits, samples)."""
+        """Return for each limit each machine's value at its worst pose, (limits, samples)."""
         deviations = self._deviations(sigma)
         places = np.flatnonzero(deviations)
         root = np.random.SeedSequence(checked_seed(seed))
@@ -301,7 +301,7 @@ class _Trial:
 
 
 def _within(values: FloatArray, margin: float = 0.0) -> float:
-    """What 99.7 % of the values do not exceed; with so many deviations of drawing added."""
+    """Return the value that 99.7 % do not exceed, plus so many deviations of drawing."""
     drawing = np.sqrt(_SHARE * (1 - _SHARE) / len(values))
     return float(np.quantile(values, min(_SHARE + margin * drawing, 1.0), method="inverted_cdf"))
 

@@ -82,7 +82,7 @@ class Sensitivity(Result):
 
     @property
     def n_failed(self) -> IntArray:
-        """How many poses were not solved, (c,)."""
+        """Number of poses that were not solved, (c,)."""
         missing = np.isnan(self.exact).any(axis=-1)
         counted: IntArray = missing.reshape(len(self.cases), -1).sum(axis=1)
         return counted

@@ -14,7 +14,7 @@ _SLACK = 1e-6  # of a limit, by which shares may overdraw it before they are sca
 
 
 def equal(use: FloatArray) -> FloatArray:
-    """The same share of the budget where each joint matters most; then all as wide as they may.
+    """Share the budget equally where each joint matters most; then widen all as far as they may.
 
     `use` (N, g) is what 1 mm² or rad² of each joint adds to each limited variance, of 1 allowed.
     """

@@ -89,7 +89,7 @@ class Tolerance(Result):
 
     @property
     def n_failed(self) -> IntArray:
-        """How many machines have no pose there, (...)."""
+        """Number of machines without a pose there, (...)."""
         return self.failed
 
     @property

@@ -1,4 +1,4 @@
-"""Where a calibration begins: its equations at the nominal machine, frames laid on the readings."""
+"""The start of a calibration: equations at the nominal machine, frames aligned to readings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the closures say of each pose: how it follows from actuators, exactly, nearly, or not alone.
+"""Closures by pose: the pose follows from the actuators exactly, nearly, or not alone.
 
 An estimator that gives every row a pose of its own needs three things of a machine: unknowns of the
 pose, equations between them and what the actuators read, and how the pose moves with the unknowns
@@ -37,7 +37,7 @@ _STEPS = 30  # back onto them
 
 
 class Closures(Protocol):
-    """What the closures of a machine say of its poses."""
+    """The closures of a machine at its poses."""
 
     unknowns: int
     equations: int
@@ -59,7 +59,7 @@ class Closures(Protocol):
         """Factors (equations,) to mm of the equations times their sigma."""
 
     def twists(self, robot: Calibratable, states: RowStates) -> FloatArray:
-        """How the platform moves with the unknowns: twists (K, 6, unknowns)."""
+        """Compute twists of the platform by the unknowns, (K, 6, unknowns)."""
 
     def by_numbers(self, robot: Calibratable, states: RowStates, places: IntArray) -> FloatArray:
         """Derivative of the equations by numbers of the geometry, (K, equations, p)."""
@@ -67,7 +67,7 @@ class Closures(Protocol):
     def twists_by_numbers(
         self, robot: Calibratable, states: RowStates, places: IntArray
     ) -> FloatArray | None:
-        """How the platform moves with them while the unknowns are held, (K, 6, p); None: not."""
+        """Compute twists by numbers while the unknowns are held, (K, 6, p); None without any."""
 
 
 class ExactActuators:
@@ -147,12 +147,12 @@ class NoisyActuators:
         return self.settled(robot, RowStates(states.pose, actuators, states.status))
 
     def residual(self, robot: Calibratable, states: RowStates) -> tuple[FloatArray, FloatArray]:
-        """Where they are less what they read."""
+        """Return the readings of the actuators at the poses, less what was read."""
         off = (states.actuators - self.read)[:, self._free]
         return off * self._white, self._white[:, :, None] * np.eye(self.unknowns)
 
     def lengths(self, robot: Calibratable) -> FloatArray:
-        """Of the actuators' units."""
+        """Return the scale of each equation in the actuators' units."""
         return mm_per_unit(robot.actuator_units, robot.length)[self._free]
 
     def twists(self, robot: Calibratable, states: RowStates) -> FloatArray:
@@ -219,7 +219,7 @@ class FreePoses:
         self._white, self._white_steps = self._whitening(sigma)
 
     def _whitening(self, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """What deviations (K, equations) whiten equations with, and their derivatives."""
+        """Compute whitening from deviations (K, equations), and its derivatives."""
         white = 1.0 / sigma
         some = white[:1] if (sigma == sigma[:1]).all() else white
         return white, np.repeat(some[:, :, None], self.unknowns, axis=2)
@@ -235,7 +235,7 @@ class FreePoses:
         return self._kept(robot, self._stepped(robot, states, step))
 
     def residual(self, robot: Calibratable, states: RowStates) -> tuple[FloatArray, FloatArray]:
-        """What the limbs would read at the poses less what they read."""
+        """Return the limbs' readings at the poses, less what was read."""
         off, by_step = self._rows(robot, states)
         if self._mixed:
             off, by_step = off @ self._read.T, self._read @ by_step
@@ -246,7 +246,7 @@ class FreePoses:
         return off, by_step
 
     def lengths(self, robot: Calibratable) -> FloatArray:
-        """Of the actuators' units; the other rows are in mm."""
+        """Return the scale of each equation: actuators' units; the other rows are in mm."""
         arc = robot.length if any(self._turning) else 1.0
         return np.array([arc if turning else 1.0 for turning in self._turning])
 
@@ -256,7 +256,7 @@ class FreePoses:
         return twists @ self._allowed(robot, states)[0] if len(self._held) else twists
 
     def by_numbers(self, robot: Calibratable, states: RowStates, places: IntArray) -> FloatArray:
-        """What the limbs would read, unknowns held."""
+        """Differentiate the limbs' readings by numbers, unknowns held."""
         by_free = self._rows_by_numbers(robot, states, places)
         found = self._read @ by_free if self._mixed else by_free
         if len(self._held):
@@ -277,13 +277,13 @@ class FreePoses:
     # rows of read and held equations by steps of the unknowns, before any is held -----------------
 
     def _rows(self, robot: Calibratable, states: RowStates) -> tuple[FloatArray, FloatArray]:
-        """What they miss (K, rows), and their derivative by the steps (K, rows, s)."""
+        """Compute what the rows miss (K, rows), and the derivative by steps (K, rows, s)."""
         return pose_steps.readings(machine_of(robot), states.pose, self.read)
 
     def _rows_by_numbers(
         self, robot: Calibratable, states: RowStates, places: IntArray
     ) -> FloatArray:
-        """Their derivative by numbers of the geometry, (K, rows, p)."""
+        """Differentiate the rows by numbers of the geometry, (K, rows, p)."""
         return pose_steps.readings_by_numbers(machine_of(robot), states.pose, self.read, places)
 
     def _stepped(self, robot: Calibratable, states: RowStates, step: FloatArray) -> RowStates:
@@ -355,7 +355,7 @@ def one_mm(robot: Calibratable, read: FloatArray) -> FloatArray:
 def has_equations(
     robot: Calibratable, sigmas: Sequence[FloatArray | None], estimated: bool
 ) -> bool:
-    """Whether closures are equations, for these deviations of the actuators; see `closures_of`."""
+    """Return whether closures are equations for these deviations; see `closures_of`."""
     noisy = estimated or any(sigma is not None and bool(sigma.any()) for sigma in sigmas)
     return noisy or (isinstance(robot, Robot) and pose_steps.surplus(robot) > 0)
 
@@ -363,7 +363,7 @@ def has_equations(
 def closures_of(
     robot: Calibratable, read: FloatArray, sigma: FloatArray | None, estimated: bool
 ) -> ExactActuators | NoisyActuators | FreePoses:
-    """What the closures of a machine say, for actuators that read so (K, n).
+    """Make the closures of a machine for the actuator readings (K, n).
 
     Parameters
     ----------

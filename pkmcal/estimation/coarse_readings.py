@@ -47,7 +47,7 @@ class Coarse:
 
     @property
     def widening(self) -> float:
-        """By how much ± must be wider, so that they allow for rounding."""
+        """Return the widening of ± that allows for rounding."""
         return max(self.floor / self.used, 1.0) if self.used > 0 else 1.0
 
 

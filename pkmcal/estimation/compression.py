@@ -46,7 +46,7 @@ class Triangles(Predicted):
 
 @dataclass(frozen=True, eq=False)
 class RowsInLots:
-    """How the rows of a set are compressed.
+    """The lots that the rows of a set are compressed in.
 
     Attributes
     ----------
@@ -70,7 +70,7 @@ class RowsInLots:
 
     @classmethod
     def of(cls, prediction: Prediction, whitening: Whitening, i: int) -> RowsInLots | None:
-        """Those of set `i`; None where its rows have nothing in common, or would not become fewer.
+        """Find the lots of set `i`; None where rows have nothing in common, or stay as many.
 
         Rows of a lot are at one pose and depend on the same parameters.
         """
@@ -109,7 +109,7 @@ class RowsInLots:
     def triangles(
         self, i: int, shared: Sequence[Shared], measured: Measurements, whitening: Whitening
     ) -> Triangles:
-        """The triangles of set `i`, by the readings of its parts."""
+        """Make the triangles of set `i`, by the readings of its parts."""
         width, (rows, k) = self.equations.unknowns, whitening.read[i].shape
         values, columns = np.empty((rows, k)), np.empty((rows, k, width))
         for (mine, _), part in zip(self.parts, shared, strict=True):
@@ -153,7 +153,7 @@ class RowsInLots:
 
 @dataclass(frozen=True, eq=False)
 class CompressedPrediction(Prediction):
-    """What instruments should read, lots of rows as triangles.
+    """Predicted readings, lots of rows as triangles.
 
     A lot stands for its rows: where there is one number for each row, it has one, that of the
     first.
@@ -174,7 +174,7 @@ class CompressedPrediction(Prediction):
 
     @cached_property
     def guess(self) -> RowStates:
-        """Of the poses."""
+        """Where a search for the poses begins."""
         return self.whole.guess
 
     def of_set(self, i: int, pose: FloatArray, theta: FloatArray) -> Predicted:
@@ -190,27 +190,27 @@ class CompressedPrediction(Prediction):
         return own.triangles(i, shared, measured, self.whitening)
 
     def of_rows(self, predicted: Sequence[Predicted]) -> tuple[FloatArray, ...]:
-        """What is predicted of the rows (N, k) of each set."""
+        """Return the predicted values of the rows (N, k) of each set."""
         return tuple(
             each.of_rows if isinstance(each, Triangles) else each.values for each in predicted
         )
 
     def residuals(self, predicted: Sequence[Predicted]) -> tuple[FloatArray, ...]:
-        """Measured less predicted of the rows of each set."""
+        """Return measured less predicted of the rows of each set."""
         return tuple(
             each.residual if isinstance(each, Triangles) else self.whole.residual(i, each)
             for i, each in enumerate(predicted)
         )
 
     def misfits_of(self, predicted: Sequence[Predicted]) -> tuple[FloatArray, ...]:
-        """What the equations of each set miss, before they are whitened: of lots, triangles."""
+        """Return the misfits of the equations of each set, not whitened: of lots, triangles."""
         return tuple(
             -each.values if isinstance(each, Triangles) else self.whole.residual(i, each)
             for i, each in enumerate(predicted)
         )
 
     def misfits(self, evaluation: Evaluation) -> tuple[FloatArray, ...]:
-        """As `misfits_of`, at an evaluation."""
+        """Return `misfits_of` at an evaluation."""
         return self.misfits_of(self.predicted(evaluation))
 
     def predicted(self, evaluation: Evaluation) -> tuple[Predicted, ...]:
@@ -229,9 +229,9 @@ class CompressedPrediction(Prediction):
 def compressed(
     prediction: Prediction, whitening: Whitening
 ) -> tuple[CompressedPrediction, Whitening, IntArray] | None:
-    """The prediction and whitening of triangles; None where nothing is compressed.
+    """Compress prediction and whitening; None where nothing can be.
 
-    And how many numbers that were read each row, or lot, of them stands for beyond its own.
+    The third result is how many numbers that were read each row, or lot, stands for beyond its own.
     """
     table = prediction.table
     found = tuple(RowsInLots.of(prediction, whitening, i) for i in range(len(table.sets)))

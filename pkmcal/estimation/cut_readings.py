@@ -1,4 +1,4 @@
-"""Whether readings in steps were rounded, or cut: to the step below, or to the one towards zero.
+"""Test of readings in steps: rounded, or cut to the step below or to the one towards zero.
 
 What is cut is off by half a step more than what is rounded, in all rows alike. A score test of that
 offset tells where the machine cannot take it up. Where nothing tells, the offset may be there, and
@@ -27,7 +27,7 @@ _UNIFORM = 3.0**-0.5  # deviation of what is as likely anywhere up to half a ste
 
 @dataclass(frozen=True, eq=False)
 class Cut:
-    """What a set says of its readings in steps, were they cut.
+    """Evidence of a set that its readings in steps were cut.
 
     Attributes
     ----------
@@ -55,17 +55,17 @@ class Cut:
 
     @property
     def seen(self) -> bool:
-        """Whether they were cut."""
+        """True if the readings were cut."""
         return self.chance < _CHANCE and self.size > _HALF
 
     @property
     def refuted(self) -> bool:
-        """Whether they were not."""
+        """True if the readings were not cut."""
         return self.size + _REFUTED * self.deviation < 1.0
 
     @property
     def error(self) -> FloatArray:
-        """How the basis (p,) follows the offset, in its deviation."""
+        """Derivative of the basis (p,) by the offset, in its deviation."""
         return _UNIFORM * self.moved
 
 
@@ -76,7 +76,7 @@ def cut_readings(
     factors: FloatArray,
     coarse: Sequence[Coarse],
 ) -> Iterator[Cut]:
-    """What sets with readings in steps say of being cut, either way, for noise factors (G,)."""
+    """Test readings in steps for being cut, either way, with noise factors (G,)."""
     component = component_of(equations) if coarse else np.zeros(0)
     for i in dict.fromkeys(each.set for each in coarse):
         mine = tuple(each for each in coarse if each.set == i)

@@ -137,7 +137,7 @@ def as_fitted(
 
 
 def by_set(said: Said) -> frozenset[str]:
-    """What each set has for itself: the roles of which several sets were called unknown apart."""
+    """Return the roles that are unknown in several sets, apart for each."""
     each = {name: given for name, given in said.items() if not isinstance(given, str)}
     found = {
         name

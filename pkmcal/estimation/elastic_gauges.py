@@ -1,4 +1,4 @@
-"""How the numbers of what yields and pulls follow motions that nothing read may notice."""
+"""Gauges of elastic numbers: their change with motions that no reading may notice."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def elastic_motions(robot: Robot, platform: int, scale: int, forces: int) -> dic
 
 
 def _scales(name: str, unit: str, value: float) -> tuple[float, float]:
-    """How a number grows where all lengths do, and where all forces do."""
+    """Return the power of a number in the scale of all lengths, and in that of all forces."""
     if name.startswith(COMPLIANCE):
         grows = {"mm/N": value, "rad/(N mm)": -value}  # a number of mm/N per mm stays
         return grows.get(unit, 0.0), -value
@@ -52,13 +52,13 @@ def _scales(name: str, unit: str, value: float) -> tuple[float, float]:
 
 
 def _point(robot: Robot, stem: str, middle: FloatArray) -> FloatArray:
-    """How a point moves (3, 6) with what it is on: shifts, then turns about the middle."""
+    """Return the motion of a point (3, 6) with its body: shifts, then turns about the middle."""
     place = np.array([robot.geometry[f"{stem}.{axis}"] for axis in "xyz"])
     return np.hstack([np.eye(3), np.cross(np.eye(3), place - middle).T])
 
 
 def _tilts_by_turns(robot: Robot) -> FloatArray:
-    """How gravity's tilts (2, 3) follow turns of the base about its axes, in which they are."""
+    """Return gravity's tilts (2, 3) by turns of the base about its own axes."""
     machine = robot.machine
     assert isinstance(machine, LoadedMachine)
     numbers = machine.numbers(robot.slots)

@@ -48,7 +48,7 @@ Equate = Callable[[RowStates], Whitened]
 
 
 class Elimination:
-    """Which equations belong to which pose.
+    """The assignment of equations to poses.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ class Elimination:
         self.uninformative = poses - len(self.pose_of_block)
 
     def reduced(self, by_unknown: FloatArray, part: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """What is left (M, n) of columns (E, n) when the poses have taken their part.
+        """Project columns (E, n) onto what the poses' unknowns do not explain, (M, n).
 
         And how they take it: steps (K, u, n) of the unknowns by each column. `by_unknown` is
         (E, u).
@@ -98,7 +98,7 @@ class Elimination:
     def seen_by(
         self, by_unknown: FloatArray, some: BoolArray, left: FloatArray, least: int
     ) -> tuple[IntArray, IntArray, FloatArray]:
-        """What some of the original equations (E,) alone tell of what is left (M, n).
+        """Return the share of some original equations (E,) in the projected columns (M, n).
 
         Of poses with `least` equations left or more, which of them (B,), how many numbers each has
         (B,) and these, one after another, (Σ, n): equally uncertain ones.

@@ -106,12 +106,12 @@ class Equations:
 
     @cached_property
     def arcs(self) -> tuple[FloatArray, ...]:
-        """What takes the residuals of the components (k,) of each set to mm."""
+        """Factors that turn the residuals of the components (k,) of each set into mm."""
         return tuple(m.instrument.arcs(m, self.parameters.robot.length) for m in self.table.sets)
 
     @cached_property
     def mm(self) -> tuple[FloatArray, ...]:
-        """What one unit of each component of each set is in mm, (k,) or (N, k)."""
+        """One unit of each component of each set in mm, (k,) or (N, k)."""
         length = self.parameters.robot.length
         return tuple(m.instrument.mm(m, length) for m in self.table.sets)
 
@@ -123,7 +123,7 @@ class Equations:
 
     @property
     def sigma_stated(self) -> bool:
-        """Whether any noise is stated, of what was read or of the actuators."""
+        """True if any noise is stated, of what was read or of the actuators."""
         cells = self.table.cells
         of_actuators = isinstance(self.blocks, PoseBlocks) and not self.blocks.unstated[-1]
         of_cells = cells is not None and cells.sigma is not None
@@ -141,7 +141,7 @@ class Equations:
 
     @cached_property
     def system(self) -> PoseSystem | None:
-        """What the poses' unknowns take of the equations; None where poses have none."""
+        """The elimination of the poses' unknowns; None where poses have none."""
         if not isinstance(self.blocks, PoseBlocks):
             return None
         return PoseSystem(self.prediction, self.whitening, self.blocks)
@@ -325,7 +325,7 @@ class Equations:
         return near.onward if isinstance(near, Evaluation) else near
 
     def _states_ahead(self, machines: Machines, theta: FloatArray, near: Near) -> RowStates:
-        """Where to look for the states: as they follow the parameters from where a search is."""
+        """Predict the states from the search's present place along the parameters."""
         states = self._begun(near)
         known = near.cache.get("following") if isinstance(near, Evaluation) else None
         if known is None or known[0] is not self.system or not isinstance(near, Evaluation):

@@ -13,7 +13,7 @@ from pkmcal.estimation.loss import Loss
 
 @dataclass(frozen=True, eq=False)
 class IterationState:
-    """What one least-squares solve takes as given, and what is revised before the next.
+    """Fixed quantities of one least-squares solve, revised before the next.
 
     Attributes
     ----------
@@ -107,7 +107,7 @@ class Estimate:
         return matrix
 
     def change(self, steps: FloatArray) -> FloatArray:
-        """How the whitened predicted values (M, ...) change by scaled parameters (n, ...)."""
+        """Differentiate whitened predicted values (M, ...) by scaled parameters (n, ...)."""
         inverse = (self.basis / (self.basis**2).sum(axis=0)).T
         found: FloatArray = self.design @ (inverse @ steps)
         return found

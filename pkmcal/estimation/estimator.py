@@ -190,7 +190,7 @@ class Estimator:
         jacobian: FloatArray,
         residual: FloatArray,
     ) -> Shares | None:
-        """What no parameters explain in each group, without the prior's help.
+        """Return the residual of each group that no parameters explain, without the prior's help.
 
         None where too few equations are left to show it.
         """
@@ -368,7 +368,7 @@ class Estimator:
         return self.loss == "linear" or np.allclose(old.loss.width, new.loss.width, rtol=1e-3)
 
     def _common_factor(self, old: IterationState, new: IterationState) -> float | None:
-        """What the noise of all groups has grown by, if nothing but that distinguishes a fit."""
+        """Return the common factor of all groups' noise, as if nothing else distinguished a fit."""
         factors = new.noise / old.noise
         factor = float(factors[0])
         if self.loss != "linear" or old.determined.rank != new.determined.rank:

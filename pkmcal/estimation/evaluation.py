@@ -15,7 +15,7 @@ from pkmcal.readings.predicted import Predicted
 
 
 class Cache(TypedDict, total=False):
-    """What was computed at an evaluation and may be asked for again, after what computed it.
+    """A cache of results at an evaluation, each made by its function.
 
     "system" is of some noise (G,), too; "following" (K, u, n) is how unknowns of the poses follow
     the parameters.
@@ -64,27 +64,27 @@ class Evaluation:
 
     @property
     def pose(self) -> FloatArray:
-        """Where the machine is (K, 6)."""
+        """Poses of the machine (K, 6)."""
         return self.states.pose
 
     @property
     def actuators(self) -> FloatArray:
-        """Where the actuators are (K, n); what they read unless their noise is stated."""
+        """Coordinates of the actuators (K, n): their readings, unless their noise is stated."""
         return self.states.actuators
 
     @property
     def status(self) -> Int32Array:
-        """Of the forward kinematics (K,)."""
+        """Status of the forward kinematics (K,)."""
         return self.states.status
 
     @property
     def onward(self) -> RowStates:
-        """Where a search for the poses begins from here; of a row without one, where this did."""
+        """Start of a search for the poses from here; of failed rows, the start of this search."""
         return self.states.chosen(self.status == 0, self.begun)
 
     @property
     def ok(self) -> bool:
-        """Whether the forward kinematics solved every row."""
+        """True if the forward kinematics solved every row."""
         return not self.status.any()
 
     @property

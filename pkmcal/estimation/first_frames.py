@@ -1,4 +1,4 @@
-"""Where the search for unknown frames, targets and tools starts: see `alignment` and `hand_eye`.
+"""Start of the search for unknown frames, targets, tools: see `alignment` and `hand_eye`.
 
 Targets in known frames follow from the poses. Then frame by frame; what several frames have in
 common is placed with the first of them. Frames in which points were read come first, then tools,
@@ -59,7 +59,7 @@ def aligned(
 
 
 def _gives_points(measured: Measurements) -> bool:
-    """Whether x, y and z of points were read, without an orientation."""
+    """Return whether x, y and z of points were read, without an orientation."""
     return measured.instrument.is_place and measured.instrument.turning is None
 
 
@@ -146,7 +146,7 @@ def _seen(
     parameters: Parameters,
     theta: FloatArray,
 ) -> FloatArray:
-    """What rows of set `i` read in the base frame, (N, k), tools where they are laid."""
+    """Return readings of set `i` in the base frame, (N, k), with tools that are aligned."""
     columns = prediction.columns[i].get("tool")
     if columns is None:
         return evaluation.predicted[i][rows]
@@ -210,7 +210,7 @@ def _free_targets(prediction: Prediction, i: int, rows: IntArray, free: BoolArra
 def _points(
     prediction: Prediction, evaluation: Evaluation, i: int, rows: IntArray, theta: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Where targets of rows of set `i` are in the base frame (N, 3), and how they are turned.
+    """Return targets of set `i` in the base frame (N, 3), and their orientations.
 
     Of readings without targets, the platform.
     """

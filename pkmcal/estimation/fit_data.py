@@ -1,14 +1,16 @@
-"""What readings depend on beside the pose: points, zeros, artefacts; given, or estimated."""
+"""Dependences of readings beside the pose: points, zeros, artefacts; fixed or estimated."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from itertools import chain
 
 import numpy as np
 
 from pkmcal.arrays import BoolArray, IntArray
 from pkmcal.effects.effect import Effect
+from pkmcal.exceptions import ArgumentError
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.readings.unknowns import PLACE, Dependence, Numbers, Start, points_of
 
@@ -52,7 +54,7 @@ class FitData:
 
     @property
     def framed(self) -> bool:
-        """Whether these readings depend on the unknown frame."""
+        """True if these readings depend on the unknown frame."""
         instrument = self.measured.instrument
         return bool(instrument.framed and (self.unknown_frame or not instrument.placed))
 
@@ -63,14 +65,27 @@ class FitData:
 
     @property
     def axis(self) -> IntArray | None:
-        """Of touched lines and planes, which axis of its own each row's has, (N,)."""
+        """The artefact's own axis in each row, (N,), of touched lines and planes."""
         touched = self.measured.touched
         if touched is None:
             return None
         return np.array([self.starts["touch", name].axis for name in touched.tolist()])
 
     def dependences(self) -> Iterator[Dependence]:
-        """What the readings depend on beside the pose and the frame."""
-        yield from self.measured.instrument.dependences(self)
-        for effect in self.effects:
-            yield from effect.dependences(self.measured)
+        """Return the dependences of the readings beside pose and frame.
+
+        Raises
+        ------
+        ValueError
+            A dependence that does not have one entry for each row.
+        """
+        own = self.measured.instrument.dependences(self)
+        of_effects = (effect.dependences(self.measured) for effect in self.effects)
+        for each in (*own, *chain.from_iterable(of_effects)):
+            if not len(each.index) == len(each.given) == len(self.measured):
+                raise ArgumentError(
+                    f"{each.argument}: the dependence on it has {len(each.index)} names and"
+                    f" {len(each.given)} given numbers; it needs one of each for each of"
+                    f" {len(self.measured)} rows"
+                )
+            yield each

@@ -1,4 +1,4 @@
-"""Which numbers of a calibration are parameters: what is free, of which sessions and sets.
+"""Choice of the parameters of a calibration: what is free, in which sessions and sets.
 
 And with which start, prior and bounds, by the names that the user states.
 """
@@ -317,7 +317,7 @@ def _matching(argument: str, pattern: object, names: Sequence[str], strict: bool
 def _prior(
     asked: Asked, names: Sequence[str], scale: FloatArray, of_machine: int, strict: bool
 ) -> FloatArray:
-    """What is known of each parameter: as effects have it, but where `prior` names it."""
+    """Return the prior of each parameter: as effects state it, unless `prior` names it."""
     prior = asked.prior
     sigma = np.full(len(names), np.inf)
     of_effects = [asked.of_effects.get(name.partition("@")[0], np.inf) for name in names]

@@ -133,7 +133,7 @@ def _move(
 
 
 def _tilts(robot: Robot, i: int) -> dict[str, FloatArray]:
-    """Of each axis of a limb its two tilts and its turn about itself, by turns about x, y and z."""
+    """Return each limb axis' tilts and turn about itself, by turns about x, y and z."""
     limb, found = robot.model.limbs[i], {}
     for axis in KINDS[limb.kind].axes_of(limb.couple > 0):
         tilt1, tilt2 = (robot.slots[i, SLOTS.index(name)] for name in AXES[axis])
@@ -145,7 +145,7 @@ def _tilts(robot: Robot, i: int) -> dict[str, FloatArray]:
 
 
 def _swivel_zeros(parameters: Parameters) -> dict[int, FloatArray]:
-    """How zeros of the angles of swivels follow the motions, by parameter."""
+    """Return derivatives of the zeros of swivel angles by the motions, by parameter."""
     robot, found = parameters.robot, {}
     assert isinstance(robot, Robot)
     for i in robot.model.pulleys:
@@ -158,7 +158,7 @@ def _swivel_zeros(parameters: Parameters) -> dict[int, FloatArray]:
 
 
 def _of_load(parameters: Parameters) -> dict[int, FloatArray]:
-    """How numbers of a load that tensions balance follow the motions, by parameter."""
+    """Return derivatives by the motions of load numbers that tensions balance, by parameter."""
     robot = parameters.robot
     assert isinstance(robot, Robot)
     load, middle = robot.model.balanced_load, robot.slots[:, 3:6].mean(axis=0)

@@ -31,7 +31,7 @@ class Held:
 
     @property
     def name(self) -> str:
-        """Of the effect."""
+        """Name of the effect."""
         return self.effect.name
 
     def of_rows(self, measured: Any) -> EffectOfRows:
@@ -39,7 +39,7 @@ class Held:
         return self.effect.of_rows(measured)
 
     def dependences(self, measured: Any) -> Iterator[Dependence]:
-        """Its coefficients, the held ones among what is given."""
+        """Return the effect's coefficients, the held ones as fixed."""
         for each in self.effect.dependences(measured):
             yield self._without_held(each)
 

@@ -1,4 +1,4 @@
-"""Which combinations of the parameters are identifiable, and how well.
+"""Identifiable combinations of the parameters, and how well each is determined.
 
 Everything here is in scaled parameters: 1 means about 1 mm at the machine.
 """
@@ -103,7 +103,7 @@ def directions(
 
 
 def held_errors(jacobian: FloatArray, prior: FloatArray, rank: int, size: float) -> FloatArray:
-    """What combinations may be off by that are held though errors of the machine show them.
+    """Return errors of held combinations that errors of the machine make visible.
 
     The machine as it was found determines a little what the nominal one does not. That is too
     little to be estimated, but what is held there shifts the other parameters.
@@ -217,7 +217,7 @@ def sparse_basis(unidentifiable: FloatArray, names: Sequence[str]) -> FloatArray
 
 
 def _dimension(shares: Sequence[FloatArray], support: Sequence[int]) -> int:
-    """How many combinations have next to nothing outside some kinds of parameters, at most.
+    """Return the largest number of combinations almost wholly within some kinds of parameters.
 
     By eigenvalues, which are the squares of what is outside: quicker than the singular values, of
     which they have half the digits. A few supports of thousands have any.
@@ -299,7 +299,7 @@ def as_sum(
 
 
 def _counted(unit: str, factor: float) -> str:
-    """How a number that is no length counts among lengths in mm."""
+    """Return the weight of a number that is no length among lengths in mm."""
     if unit == "rad":
         return f"angles as arcs at {factor:.4g} mm"
     return f"numbers {'without unit' if unit == '1' else f'in {unit}'} times {factor:.3g}"

@@ -1,4 +1,4 @@
-"""What each equation of a calibration belongs to: set, row, pose, target and component.
+"""Labels of each equation of a calibration: set, row, pose, target and component.
 
 Where poses follow from the actuators the equations are readings. Where poses have unknowns an
 equation is a mixture of all that was read at a pose, closures included: of such a unit only the
@@ -20,7 +20,7 @@ from pkmcal.statistics.linear_fit import numbered
 
 @dataclass(frozen=True, eq=False)
 class Labels:
-    """What each of M equations belongs to, by number.
+    """Labels of M equations, by number.
 
     Attributes
     ----------

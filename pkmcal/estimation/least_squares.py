@@ -29,7 +29,7 @@ class SingularError(FitError):
 
 @dataclass(frozen=True, eq=False)
 class Trail:
-    """How far a search has come.
+    """The course of a search.
 
     Attributes
     ----------
@@ -119,7 +119,7 @@ class Search:
         return found
 
     def _pulled(self, theta: FloatArray) -> FloatArray:
-        """What each prior misses (p,) at all parameters."""
+        """Return the misfit of each prior (p,) at all parameters."""
         if not len(self._stated):
             return np.empty(0)
         pulled: FloatArray = self.equations.parameters.prior_left(theta)[self._stated]
@@ -145,7 +145,7 @@ class Search:
         return found
 
     def own_jacobian(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
-        """As `jacobian`, for a caller who changes it: it is not kept."""
+        """Return `jacobian` in memory of its own, which the caller may change."""
         found = np.empty((self._equations, len(self.scale)))
         for _, some, by_u in self._batches(evaluation, noise):
             if len(by_u) == len(found):
@@ -187,7 +187,7 @@ class Search:
     def best(
         self, trail: Trail, u: FloatArray, noise: FloatArray, loss: Loss, pins: FloatArray
     ) -> tuple[FloatArray, Trail]:
-        """Where the cost is least, from `u` (n,), and the trail there.
+        """Return the place of least cost from `u` (n,) on, and the trail there.
 
         Rows that the machine cannot reach bar the way of a step. Where that happened, the search
         goes round: first without those rows, then from there with all of them.
@@ -289,7 +289,7 @@ class Search:
     def _searched(
         self, residual: Function, jacobian: Function, u: FloatArray
     ) -> tuple[FloatArray, float, bool]:
-        """Where the squares of `residual` are least, half their sum, and whether steps ended."""
+        """Minimise half the sum of squares of `residual`; say whether the steps ended."""
         from scipy.optimize import least_squares, leastsq
 
         if self._bounds is None:

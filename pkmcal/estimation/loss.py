@@ -51,7 +51,7 @@ class Loss:
     stands_for: IntArray | None = None
 
     def of(self, units: slice) -> Loss:
-        """The same for some of the rows."""
+        """Return the loss for some of the rows."""
         many = None if self.stands_for is None else self.stands_for[units]
         return Loss(self.name, self.components[units], self.width[units], many)
 
@@ -74,7 +74,7 @@ class Loss:
         return 1.0 / np.maximum(ratio, 1.0) if self.name == "huber" else 1.0 / (1.0 + ratio**2)
 
     def decline(self, residual: FloatArray) -> FloatArray:
-        """How the weights fall: s ∂w/∂s of each row (N,), s the length of its residual (M,)."""
+        """Return the weights' fall s ∂w/∂s for each row (N,), s its residual's length (M,)."""
         ratio = self._lengths(residual) / self._limit
         if self.name == "linear":
             return np.zeros(len(self.components))

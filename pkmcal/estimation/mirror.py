@@ -1,4 +1,4 @@
-"""Whether the mirror image of a machine fits as well as the machine: no derivative sees it.
+"""Check whether the mirror image of a machine fits as well as the machine: no derivative sees it.
 
 With the points of the base reflected in a plane by S and those of the platform by T, both 4 x 4,
 and every pose M in the place of S M T, each joint of the platform is reflected as the base is, and
@@ -27,7 +27,7 @@ _NO_TURN = ("translation", "xy")  # maps of platforms that do not turn: T turns 
 
 
 def mirror_fits(equations: Equations, evaluation: Evaluation, noise: FloatArray) -> bool:
-    """Whether a mirror image that keeps all numbers that are not free fits as well.
+    """Return whether a mirror image that keeps all numbers that are not free fits as well.
 
     The poses are fitted there. Axes, such as those of swivels, are left as they are.
     """
@@ -104,12 +104,12 @@ def _mirrors(
 
 
 def _held(points: Points, free: tuple[str, ...]) -> BoolArray:
-    """Which coordinates (k, 3) are not free."""
+    """Mark coordinates (k, 3) that are not free."""
     return np.array([[f"{name}.{axis}" not in free for axis in "xyz"] for name in points])
 
 
 def _normals(points: Points, free: tuple[str, ...], dimensions: int) -> list[FloatArray]:
-    """Of planes across the axes, and of one through all points that are held."""
+    """Return normals of planes across the axes, and of one through all held points."""
     normals = list(np.eye(3)[:dimensions])
     places, held = np.array(list(points.values())), _held(points, free)
     kept = places[held[:, :dimensions].any(axis=1), :dimensions]

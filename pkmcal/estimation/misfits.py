@@ -1,4 +1,4 @@
-"""How far off readings and closures are at an evaluation, in mm and N."""
+"""Misfits of readings and closures at an evaluation, in mm and N."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _ROUNDING = 2e-15  # of the largest value: the error of a solved pose
 
 
 def worst_readings(equations: Equations, pose: FloatArray, theta: FloatArray) -> FloatArray:
-    """How far off the worst reading at each pose (K, 6) is, mm (K,); inf without a pose.
+    """Return the worst reading of each pose (K, 6), mm (K,); inf without a pose.
 
     Angles count as their arc. NaN where nothing was read.
     """
@@ -34,7 +34,7 @@ def worst_readings(equations: Equations, pose: FloatArray, theta: FloatArray) ->
 
 
 def distances(equations: Equations, evaluation: Evaluation) -> FloatArray:
-    """How far off each measured point is, mm, in the order of the sets."""
+    """Return distances of the measured points, mm, in the order of the sets."""
     whole = equations.whole or equations
     return np.concatenate([
         np.linalg.norm(of_read(m, r) * mm if m.components else of_read(m, r), axis=1)
@@ -56,7 +56,7 @@ def progress(equations: Equations, evaluation: Evaluation) -> float:
 def closure_rms(
     equations: Equations, evaluation: Evaluation, poses: BoolArray | None = None
 ) -> float:
-    """How far off the closures are at poses (K,), mm of the actuators; NaN where they hold."""
+    """Return the rms misfit of the closures at poses (K,), mm of actuators; NaN where they hold."""
     system = equations.system
     if system is None:
         return float("nan")
@@ -68,7 +68,7 @@ def closure_rms(
 
 
 def worst_closures(equations: Equations, evaluation: Evaluation) -> FloatArray:
-    """How far off the worst closure at each pose is, mm (K,); NaN where they hold."""
+    """Return the worst closure of each pose, mm (K,); NaN where closures hold."""
     system = equations.system
     if system is None:
         return np.full(len(equations.table.actuators), np.nan)
@@ -79,7 +79,7 @@ def worst_closures(equations: Equations, evaluation: Evaluation) -> FloatArray:
 
 
 def cell_rms(equations: Equations, evaluation: Evaluation) -> float:
-    """How far tensions are off what load cells read, N; NaN where they are no unknowns."""
+    """Return tensions' misfit to the load cells, N; NaN where tensions are no unknowns."""
     cells, system = equations.machines.cells, equations.system
     if not cells or system is None:
         return float("nan")

@@ -39,7 +39,7 @@ def checked_residuals(residuals: object) -> tuple[Residual, ...]:
 
 
 def residual_name(residual: Residual) -> str:
-    """What messages call a residual: the name of its function or class."""
+    """Name a residual for messages: its function or class."""
     return str(getattr(residual, "__name__", type(residual).__name__))
 
 
@@ -77,7 +77,7 @@ def at_parameters(
     theta: FloatArray,
     scale: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """What a residual is (k,) at parameters θ (n,), and its derivative (k, n).
+    """Return a residual (k,) at parameters θ (n,), and its derivative (k, n).
 
     By central differences where it brings no derivatives. `named` and `rates` are the numbers by
     name and their derivatives (n,), `scale` (n,) what moves the machine by about 1 mm.

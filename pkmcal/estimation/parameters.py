@@ -33,7 +33,7 @@ Bounds = Mapping[str, tuple[float, float]] | None
 
 @dataclass(frozen=True)
 class Asked:
-    """What `identify` was asked for: its arguments of the same names.
+    """The arguments of `identify`, by the same names.
 
     Attributes
     ----------
@@ -161,13 +161,13 @@ class Parameters:
         return np.vstack([self._of_parameters, self.off_functions(theta)[1] * self.scale])
 
     def prior_left(self, theta: FloatArray) -> FloatArray:
-        """What the prior misses (p,) at `theta`, in standard deviations."""
+        """Return the prior's misfit (p,) at `theta`, in standard deviations."""
         left: FloatArray = self._of_parameters @ ((self.start - theta) / self.scale)
         drawn = 0.0 if self.drawn is None else self.drawn
         return np.concatenate([left, drawn - self.off_functions(theta)[0]])
 
     def off_functions(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """How far functions and bends are off what is stated (s,), in deviations; by θ (s, n)."""
+        """Return misfits of stated functions and bends (s,), in deviations, and by θ (s, n)."""
         rows, constant = self._smooth
         off: FloatArray = rows @ theta + constant
         for each in self.residuals[::-1]:
@@ -186,7 +186,7 @@ class Parameters:
 
     @property
     def prior_names(self) -> list[str]:
-        """What each of `prior_rows` is of, but for uncertain numbers."""
+        """Names of `prior_rows`, without those of uncertain numbers."""
         stated = [self.names[i] for i in self._stated]
         stated += [each.name for each in self.functions]
         for each in self.residuals:
@@ -205,7 +205,7 @@ class Parameters:
 
     @property
     def prior_of_uncertain(self) -> slice:
-        """Which of `prior_rows` are those of uncertain numbers."""
+        """The part of `prior_rows` that is of uncertain numbers."""
         first = len(self._stated)
         return slice(first, first + len(self.spread))
 
@@ -236,7 +236,7 @@ class Parameters:
         return tuple(np.flatnonzero(np.isin(self.number_of, numbers)).tolist())
 
     def columns_of(self, datasets: Sequence[FitData]) -> tuple[IntArray, tuple[IntArray, ...]]:
-        """Which parameters the numbers of a row are.
+        """Return the parameters of a row's numbers.
 
         Of each part (P, m), rows of one session and one set, with `NONE` where its rows have no
         such number; and the part of each row of each set.
@@ -280,7 +280,7 @@ class Parameters:
         return values
 
     def by_name(self, theta: FloatArray) -> dict[str, float]:
-        """All numbers at `theta` (n,) by name: of the geometry, and beside it.
+        """Return all numbers at `theta` (n,) by name: the geometry's and the others.
 
         What each session has for itself is there by its name with the session alone.
         """

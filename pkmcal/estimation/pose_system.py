@@ -99,14 +99,14 @@ class PoseSystem:
         residual: FloatArray,
         leverage: FloatArray,
     ) -> Shares:
-        """As `Equations.by_groups`."""
+        """Forward to `Equations.by_groups`."""
         (_, by_unknown, _), group = self.at(evaluation, noise), self.blocks.group_of_equation
         return self.blocks.elimination.by_groups(by_unknown, group, weights, residual, leverage)
 
     def closures_alone(
         self, evaluation: Evaluation, noise: FloatArray, left: FloatArray, least: int
     ) -> tuple[IntArray, IntArray, FloatArray]:
-        """What the closures alone tell of what is left (M, n): see `Elimination.seen_by`."""
+        """Return the closures' share of projected columns (M, n): see `Elimination.seen_by`."""
         _, by_unknown, _ = self.at(evaluation, noise)
         closures = np.arange(len(by_unknown)) < int(self.blocks.counts.sum())
         return self.blocks.elimination.seen_by(by_unknown, closures, left, least)
@@ -131,7 +131,7 @@ class PoseSystem:
         return longer, freedom
 
     def readings_off(self, evaluation: Evaluation) -> FloatArray:
-        """What actuators and load cells would read at the poses less what they read (K, e)."""
+        """Return readings of actuators and load cells at the poses, less what was read (K, e)."""
         known = evaluation.cache.get("system")
         if known is not None and known[0] is self and self.blocks.counting is None:
             _, factors, (off, _, _) = known

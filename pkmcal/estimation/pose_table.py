@@ -149,7 +149,7 @@ def pose_table(datasets: Sequence[FitData], parameters: Parameters) -> PoseTable
 
 
 def tells_actuators(sets: Sequence[Measurements]) -> bool:
-    """Whether what was read tells how well actuators were, which nobody has stated.
+    """Return whether what was read tells how well actuators were, which nobody has stated.
 
     Pictures of many corners are read better than machines move to the same pose.
     """
@@ -163,7 +163,7 @@ def tells_actuators(sets: Sequence[Measurements]) -> bool:
 def _again(
     sets: Sequence[Measurements], read: Sequence[IntArray], commands: FloatArray
 ) -> IntArray:
-    """How often each row (C,) without a reading was there before: equal ones are read again.
+    """Count equal rows (C,) without a reading that came before: equal rows are read again.
 
     Rows of one set after another. A set all rows of which are in another one is a copy, which
     counts with that one; second places, which come last, do not count.
@@ -187,7 +187,7 @@ def _again(
 
 
 def _times(key: IntArray, before: IntArray) -> IntArray:
-    """How often each key (N,) is among those `before`, and ahead of it."""
+    """Count earlier keys that equal each key (N,), among those `before` and among these."""
     whole = np.concatenate([before, key])
     order = np.argsort(whole, kind="stable")
     first = np.flatnonzero(np.diff(whole[order], prepend=-1))
@@ -221,7 +221,7 @@ def _machines(
 def _commands(
     sets: Sequence[Measurements], sources: Sequence[Measurements], cells: Cells | None
 ) -> dict[str, FloatArray]:
-    """What distinguishes the poses of rows, (N, n) each; those of second places come last."""
+    """Return what distinguishes the poses of rows, (N, n) each; second places come last."""
     noises = [m.actuator_sigma for m in sources if m.actuator_sigma is not None]
     states = [m.drive_state for m in sets]
     states += [m.other_drive_state for m in sets if m.other is not None]

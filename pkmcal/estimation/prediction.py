@@ -1,4 +1,4 @@
-"""What instruments should read at given poses, and how that follows the parameters."""
+"""Predicted readings of instruments at given poses, and their derivatives."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from pkmcal.estimation.parameters import Parameters
 from pkmcal.estimation.pose_table import PoseTable, pose_table
 from pkmcal.estimation.row_states import RowStates
 from pkmcal.estimation.sessions import NONE, by_parameters
-from pkmcal.estimation.shapes import require_derivatives, require_moved, require_predicted
+from pkmcal.estimation.shapes import effect_of_rows, require_derivatives, require_moved
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.readings import orientation
-from pkmcal.readings.predicted import At, Predicted, joined
+from pkmcal.readings.predicted import At, Predicted, joined, require_predicted
 
 _BATCH = 1024  # rows whose derivatives by the parameters are made at once, as many as caches hold
 
@@ -31,7 +31,7 @@ Part = tuple[int, slice, FloatArray]  # a set, rows of it, and their derivative 
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """What the instruments should read at given poses, and its derivatives.
+    """The predicted readings of instruments at given poses, and their derivatives.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class Prediction:
 
     @classmethod
     def of(cls, datasets: Sequence[FitData], parameters: Parameters) -> Prediction:
-        """Of the rows to be fitted or held out.
+        """Make the prediction of the rows to be fitted or held out.
 
         Raises
         ------
@@ -88,7 +88,8 @@ class Prediction:
                 for mine, part in zip(numbers, table.part_of, strict=True)
             ),
             effects=tuple(
-                tuple(effect.of_rows(data.measured) for effect in data.effects) for data in datasets
+                tuple(effect_of_rows(effect, data.measured) for effect in data.effects)
+                for data in datasets
             ),
         )
 
@@ -113,7 +114,7 @@ class Prediction:
 
     @cached_property
     def guess(self) -> RowStates:
-        """Where a search for the poses begins: at home, or where they were read."""
+        """Return the start of a search for the poses: home, or the poses that were read."""
         table = self.table
         guess = np.tile(self.parameters.robot.home, (len(table.actuators), 1))
         for i, (measured, place) in enumerate(zip(table.sets, table.pose_of, strict=True)):
@@ -148,7 +149,7 @@ class Prediction:
                 )
 
     def arguments_of(self, i: int, theta: FloatArray) -> dict[str, FloatArray]:
-        """What readings of set `i` depend on beside the pose, (N, w) each, for `predict`."""
+        """Return what readings of set `i` depend on beside the pose, (N, w) each, for `predict`."""
         found = dict(self.given[i])
         for name, columns in self.columns[i].items():
             found[name] = np.where(columns == NONE, found[name], theta[columns])
@@ -168,13 +169,13 @@ class Prediction:
         if not m.components:
             return Predicted(np.empty((len(m), 0)), np.empty((len(m), 0, 6)))
         alone = self._by_geometry_alone(i, pose, theta)
-        require_predicted(m.instrument, len(m), alone)
+        require_predicted(m.kind, len(m.components), len(m), alone)
         moved = self._moved(i, alone, pose, theta)
         require_derivatives(m.instrument, moved, self.numbers[i])
         return moved
 
     def of_rows(self, predicted: Sequence[Predicted]) -> tuple[FloatArray, ...]:
-        """What is predicted of the rows (N, k) of each set."""
+        """Return the predicted values of the rows (N, k) of each set."""
         return tuple(each.values for each in predicted)
 
     def residuals(self, predicted: Sequence[Predicted]) -> tuple[FloatArray, ...]:
@@ -187,11 +188,11 @@ class Prediction:
         return measured.instrument.difference(measured.values, predicted.values)
 
     def misfits_of(self, predicted: Sequence[Predicted]) -> tuple[FloatArray, ...]:
-        """What the equations of each set miss, before they are whitened: the residuals."""
+        """Return the misfits of the equations of each set, not whitened: the residuals."""
         return self.residuals(predicted)
 
     def misfits(self, evaluation: Evaluation) -> tuple[FloatArray, ...]:
-        """As `misfits_of`, at an evaluation."""
+        """Return `misfits_of` at an evaluation."""
         return evaluation.residuals
 
     def rows_in_frames(self, i: int) -> list[IntArray]:
@@ -202,10 +203,7 @@ class Prediction:
     def in_frames(
         self, i: int, pose: FloatArray, theta: FloatArray
     ) -> Iterator[tuple[At, dict[str, FloatArray], IntArray]]:
-        """Where the machine is in the rows of a set, and the other arguments of `predict`.
-
-        Frame by frame, with these rows.
-        """
+        """Iterate over the frames of a set: place, arguments of `predict`, rows of each."""
         data = self.datasets[i]
         numbers, at = self.arguments_of(i, theta), self._place(i, pose, theta)
         for effect in data.effects:
@@ -232,7 +230,7 @@ class Prediction:
     def _moved(
         self, i: int, predicted: Predicted, pose: FloatArray, theta: FloatArray
     ) -> Predicted:
-        """What is read of set `i` where effects have moved the platform."""
+        """Predict readings of set `i` where effects have moved the platform."""
         effects = self.effects[i]
         if not effects:
             return predicted
@@ -263,7 +261,7 @@ class Prediction:
         return replace(predicted, values=values, by=by)
 
     def _place(self, i: int, pose: FloatArray, theta: FloatArray) -> At:
-        """Where the machine is in the rows of set `i`."""
+        """Return the machine's place in the rows of set `i`."""
         measured, other = self.table.sets[i], self.table.other_of[i]
         return At(
             pose[self.table.pose_of[i]],

@@ -26,7 +26,7 @@ _LEAST = 1e-6  # of the machine's length, below which a length has no direction
 
 
 def is_function(key: object, value: object) -> bool:
-    """Whether an entry of a prior is of a function, and not of a name or wildcard."""
+    """Return whether an entry of a prior is of a function, and not of a name or wildcard."""
     function = isinstance(key, str) and ("|" in key or bool(_OPERATOR.search(key)))
     return function or isinstance(value, tuple)
 
@@ -57,7 +57,7 @@ class PriorFunction:
     def at(
         self, theta: FloatArray, robot: Calibratable, places: IntArray
     ) -> tuple[float, FloatArray]:
-        """What it is at `theta` (n,), and its derivative (n,).
+        """Evaluate a function at `theta` (n,), with its derivative (n,).
 
         `places` (g,) are those of the free numbers in the geometry's values.
         """

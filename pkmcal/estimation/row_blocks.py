@@ -19,7 +19,7 @@ from pkmcal.estimation.session_machines import Machines
 
 @dataclass(frozen=True, eq=False)
 class RowBlocks:
-    """Which equations count together, and whose noise they have.
+    """Blocks of equations that count together, and the noise of each.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class RowBlocks:
 
     @cached_property
     def stands_for(self) -> IntArray:
-        """How many equations each block (B,) stands for: its own, and those beyond."""
+        """Number of equations that each block (B,) stands for: its own, and those beyond."""
         if self.beyond is None:
             return self.components
         many: IntArray = self.components + self.beyond.sum(axis=1)

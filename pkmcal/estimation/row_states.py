@@ -1,4 +1,4 @@
-"""Where a machine is at each distinct row of actuators."""
+"""States of a machine at each distinct row of actuators."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray
 
 @dataclass(frozen=True, eq=False)
 class RowStates:
-    """Where the machine is at each distinct row of actuators.
+    """The state of a machine at each distinct row of actuators.
 
     Attributes
     ----------
@@ -31,13 +31,13 @@ class RowStates:
     tension: FloatArray | None = None
 
     def at_poses(self, rows: IntArray, poses: FloatArray) -> RowStates:
-        """These with some rows at poses (s, 6)."""
+        """Return the states with some rows at poses (s, 6)."""
         pose = self.pose.copy()
         pose[rows] = poses
         return replace(self, pose=pose)
 
     def chosen(self, rows: BoolArray, others: RowStates) -> RowStates:
-        """These where `rows` (K,), else the others."""
+        """Choose these states where `rows` (K,), else the others."""
         if rows.all():
             return self
         actuators = self.actuators

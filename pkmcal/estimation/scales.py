@@ -1,4 +1,4 @@
-"""By how much a number of each unit moves the machine by about 1 mm."""
+"""Scales: the change of a number, by unit, that moves the machine by about 1 mm."""
 
 from __future__ import annotations
 

@@ -63,7 +63,7 @@ class Machines:
 
     @property
     def cells(self) -> int:
-        """How many of them are of load cells: the last ones."""
+        """Number of readings of load cells, which come last."""
         return self.closures[0].cells
 
     @property
@@ -100,7 +100,7 @@ class Machines:
         return _driven(robot, self.state.at(np.intp(k)))
 
     def joined(self, function: Callable[[Calibratable, IntArray], FloatArray]) -> FloatArray:
-        """What a function of a machine and its poses gives, pose by pose; in lots of poses."""
+        """Evaluate a function of machine and poses in batches of poses, and join the results."""
         parts = []
         for robot, rows in zip(self.robots, self.rows, strict=True):
             found = [function(_driven(robot, self.state.at(own)), own) for own in _lots(rows)]
@@ -140,7 +140,7 @@ class Machines:
         return whole, _joined(by_unknown, self.rows)
 
     def shifted(self, by: FloatArray) -> Machines:
-        """With closures of other readings: whitened equations (K, equations) are larger."""
+        """Return the machines with other actuator readings, by whitened shifts (K, equations)."""
         return replace(self, shift=by if self.shift is None else self.shift + by)
 
     def lengths(self) -> FloatArray:
@@ -148,7 +148,7 @@ class Machines:
         return self.closures[0].lengths(self.robots[0])
 
     def twists(self, states: RowStates) -> FloatArray:
-        """How the platform moves with the unknowns: twists (K, 6, unknowns)."""
+        """Compute twists of the platform by the unknowns, (K, 6, unknowns)."""
         found = [each.twists(robot, own) for each, robot, own in self._each(states)]
         return _joined(found, self.rows)
 
@@ -169,7 +169,7 @@ class Machines:
     def twists_by_numbers(
         self, states: RowStates, places: IntArray, poses: IntArray
     ) -> Iterator[tuple[IntArray, FloatArray]]:
-        """How the platform moves with numbers of its machine, unknowns held.
+        """Compute twists by numbers of each pose's machine, unknowns held.
 
         Of distinct poses, all where they have unknowns: those of each machine, and their twists
         (b, 6, g). Nothing where it does not move.
@@ -197,7 +197,7 @@ class Machines:
         )
 
     def with_exact_actuators(self, read: FloatArray) -> Machines:
-        """With poses that follow from what the actuators read (K, n)."""
+        """Return the machines with poses that follow exactly from the actuators (K, n)."""
         exact = tuple(ExactActuators(each) for each in _apart(read, self.rows))
         return replace(self, closures=exact, shift=None)
 

@@ -1,4 +1,4 @@
-"""Which parameters hold in which rows: common to all, or of a session or set.
+"""Scopes of parameters: common to all rows, of a session, or of a set.
 
 What a row depends on are the *numbers of a row*: the free numbers of the geometry, the frame, the
 points. Each is common to all rows, or there is one of it for each session (``offset5@thursday``) or
@@ -77,7 +77,7 @@ def set_names(
 def in_sessions(
     sets: Sequence[Measurements], beside: Collection[str] = (), word: str = ""
 ) -> list[Measurements]:
-    """The same with a session for every row: what is not stated is named after its set.
+    """Return measurements with a session in every row; an unnamed one is named after its set.
 
     `beside` are names of other sessions; names that are made consist of `word` and a number.
     """
@@ -98,7 +98,7 @@ def scopes(
     per_session: Sequence[str],
     by_set: frozenset[str],
 ) -> list[Scope]:
-    """Of each number of a row, whether it is common, of a session or of a set.
+    """Return the scope of each number of a row: common, of a session or of a set.
 
     `blocks` are what belongs together, by role and name: the frame, each point. `per_session` are
     names or wildcards of what each session has for itself, `by_set` roles that each set has.
@@ -134,11 +134,11 @@ def scopes(
 
 
 def matches(pattern: str, name: str) -> bool:
-    """Whether a name or wildcard means a parameter, with or without its session."""
+    """Return whether a name or wildcard means a parameter, with or without its session."""
     return fnmatchcase(name, pattern) or fnmatchcase(name.partition("@")[0], pattern)
 
 
 def label(scope: Scope, session: str, set_name: str) -> str:
-    """What stands behind the @ of a number's name in rows of a session and set."""
+    """Return the label behind the @ of a number's name in rows of a session and set."""
     known: Mapping[Scope, str] = {"common": "", "session": session, "set": set_name}
     return known[scope]

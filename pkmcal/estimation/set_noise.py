@@ -1,4 +1,4 @@
-"""Whether sets of measurements have the noise that was stated for each of them.
+"""Check whether sets of measurements have the noise that was stated for each of them.
 
 A common slip is a matter of scale; sets that slipped apart are weighted wrongly against each other,
 and the classical covariance, which trusts the weights, is then wrong too.
@@ -45,5 +45,5 @@ def slipped(estimator: Estimator, estimate: Estimate) -> FloatArray:
 
 
 def apart(ratio: float) -> bool:
-    """Whether a ratio of deviations matters; 0 where a set has no residual at all."""
+    """Return the ratio of deviations where it matters; 0 where a set has no residual at all."""
     return ratio > _APART or ratio * _APART < 1.0

@@ -1,4 +1,4 @@
-"""Where what readings depend on is found with the nominal machine: where the search starts.
+"""Start of what readings depend on, found with the nominal machine.
 
 Zeros of runs, mountings of sensors and touched things have no present value; each follows in closed
 form from the poses of the machine as it is described. A plane or a line is counted from the axis of
@@ -16,6 +16,7 @@ from pkmcal.estimation.fit_data import FitData
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.measurements.measurements import Measurements
+from pkmcal.readings.reading import Reading, Sets
 from pkmcal.readings.registry import KINDS
 from pkmcal.readings.touches import TouchDistance
 from pkmcal.readings.unknowns import Found
@@ -34,8 +35,24 @@ def with_starts(machine: Calibratable, datasets: Sequence[FitData]) -> list[FitD
                 if first.starts_by_pose
                 else nowhere
             )
-            first.starts(machine, pairs, found)
+            _ask(first, machine, pairs, found)
     return [replace(data, starts=found) for data in datasets]
+
+
+def _ask(reading: Reading, machine: Calibratable, pairs: Sets, found: Found) -> None:
+    """Have a reading say where the search starts; without poses it may fail for want of them."""
+    if reading.starts_by_pose:
+        reading.starts(machine, pairs, found)
+        return
+    try:
+        reading.starts(machine, pairs, found)
+    except ArgumentError:
+        raise
+    except Exception as error:
+        raise ArgumentError(
+            f"kind: starts of {reading.name!r} failed with {type(error).__name__}: {error}; where"
+            " it needs the poses of the nominal machine, its class states starts_by_pose = True"
+        ) from error
 
 
 def known_distances(datasets: Sequence[FitData]) -> list[FitData]:

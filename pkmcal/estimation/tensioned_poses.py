@@ -31,7 +31,7 @@ _SHARE = 0.1  # of the largest force: a step of a tension that counts as one of 
 
 
 class Cells(NamedTuple):
-    """What the load cells of cables read.
+    """The readings of load cells of cables.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class Cells(NamedTuple):
     sigma: FloatArray | None
 
     def of(self, rows: IntArray) -> Cells:
-        """Those of some rows."""
+        """Return the cells of some rows."""
         return Cells(self.read[rows], None if self.sigma is None else self.sigma[rows])
 
 
@@ -202,7 +202,7 @@ def _beside(one: FloatArray, other: FloatArray) -> FloatArray:
 
 
 def cells_of(robot: Calibratable, sets: Sequence[Measurements]) -> Cells | None:
-    """What load cells read of all rows of sets (N, n); None where tensions are no unknowns."""
+    """Return all load-cell readings of sets (N, n); None where tensions are no unknowns."""
     if not unknown_tensions(robot, sets):
         return None
     read = [np.full(m.actuators.shape, np.nan) if m.tension is None else m.tension for m in sets]
@@ -211,7 +211,7 @@ def cells_of(robot: Calibratable, sets: Sequence[Measurements]) -> Cells | None:
 
 
 def unknown_tensions(robot: Calibratable, sets: Sequence[Measurements]) -> bool:
-    """Whether tensions are unknowns of the rows: they balance the load, or were read with noise.
+    """Return whether tensions are unknowns: they balance the load, or were read with noise.
 
     Where they balance it, but nothing depends on them nor was any read, they are not.
 

@@ -123,7 +123,7 @@ def _last(entries: Mapping[str, float], name: str) -> tuple[str, float]:
 
 
 def _alike(name: str) -> str:
-    """What numbers have in common that are wrong by the same: kind, coordinate and session."""
+    """Return the kind, coordinate and session that numbers with a common error share."""
     stem, _, behind = name.partition("@")
     point, dot, axis = stem.partition(".")
     kind = re.sub(r"(?<=target|anchor).+|(?<=attachment).+|\d+$", "", point)

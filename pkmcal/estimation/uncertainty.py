@@ -1,4 +1,4 @@
-"""How sure an estimate is: the linear fit at the solution, its covariance and its noise."""
+"""Uncertainty of an estimate: linear fit at the solution, covariance and noise."""
 
 from __future__ import annotations
 
@@ -85,18 +85,18 @@ class Uncertainty:
 
     @property
     def known(self) -> bool:
-        """Whether there is noise to state the uncertainty: stated, or shown by spare equations."""
+        """True if there is noise to state the uncertainty: stated, or shown by spare equations."""
         return not self.unknown.any()
 
     @cached_property
     def rounded(self) -> bool:
-        """Whether the residuals are nothing but rounding errors."""
+        """True if the residuals are nothing but rounding errors."""
         limit = _ROUNDED * rounding(self.equations, self.factors)
         return bool(np.linalg.norm(self.fit.residual) < limit)
 
     @property
     def mixed(self) -> bool:
-        """Whether equations are mixtures of readings and closures; see `labels`."""
+        """True if equations are mixtures of readings and closures; see `labels`."""
         return bool(self.equations.machines.unknowns)
 
     @cached_property
@@ -112,7 +112,7 @@ class Uncertainty:
         return self.covariance.of(self.fit.back) + self._beside(self.fit.back)
 
     def _beside(self, contrasts: FloatArray) -> FloatArray | float:
-        """What offsets and numbers not fitted add to the covariance of contrasts (q, p)."""
+        """Return the covariance of contrasts (q, p) by offsets and numbers not fitted."""
         if self._offsets is None:
             return 0.0
         follow = contrasts @ self._offsets
@@ -121,7 +121,7 @@ class Uncertainty:
 
     @cached_property
     def _offsets(self) -> FloatArray | None:
-        """How the basis (p, k) follows errors that are no noise, in their deviations."""
+        """Differentiate the basis (p, k) by errors that are no noise, in their deviations."""
         cut = [each.error for each in self.cut if not each.refuted]
         columns = [*([] if self.considered is None else self.considered.T), *cut]
         return np.array(columns).T if columns else None
@@ -177,7 +177,7 @@ class Uncertainty:
 
     @cached_property
     def _place(self) -> IntArray:
-        """Which component of its row each equation is (M,)."""
+        """Component of its row for each equation (M,)."""
         return component_of(self.equations)
 
     @cached_property
@@ -340,7 +340,7 @@ def _prior_residual(estimator: Estimator, estimate: Estimate) -> FloatArray:
 def unlike_components(
     estimator: Estimator, estimate: Estimate, solution: LinearModel
 ) -> tuple[IntArray, list[FloatArray]] | None:
-    """Whether components of a set without sigma have unlike variances.
+    """Test sets without sigma for components of unlike variance.
 
     Tried in turn: lengths and angles, x y and z and angles, each component.
 

@@ -17,7 +17,7 @@ _TOGETHER = 16384  # rows that are whitened at once by matrices
 
 @dataclass(frozen=True, eq=False)
 class Whitening:
-    """What takes the readings of each set to units of their standard deviation.
+    """Whitening: it takes the readings of each set to units of their standard deviation.
 
     The `noise` (G,) of its methods multiplies the stated deviations of each set; groups beyond the
     sets have none here.
@@ -48,17 +48,17 @@ class Whitening:
 
     @cached_property
     def present(self) -> BoolArray:
-        """Which of all numbers of all sets were read, row by row."""
+        """Mark, row by row, which numbers of all sets were read."""
         return np.concatenate([read.reshape(-1) for read in self.read])
 
     @cached_property
     def complete(self) -> bool:
-        """Whether all numbers were read."""
+        """True if all numbers were read."""
         return bool(self.present.all())
 
     @cached_property
     def any_read(self) -> bool:
-        """Whether any number was read at all."""
+        """True if any number was read at all."""
         return bool(self.present.any())
 
     def reweighted(self, deviations: Sequence[FloatArray]) -> Whitening:
@@ -74,7 +74,7 @@ class Whitening:
         return self.whiten([np.array(part) for part in parts], noise)
 
     def whiten(self, parts: Sequence[FloatArray], noise: FloatArray) -> FloatArray:
-        """As `whitened`, in the memory of the parts: a Jacobian is large."""
+        """Whiten in place, as `whitened` does in new memory: a Jacobian is large."""
         for i, part in enumerate(parts):
             for rows in lots(len(part), _TOGETHER):
                 self._whiten(part[rows], i, rows, noise)
@@ -156,5 +156,5 @@ def _whitening(measured: Measurements, length: float) -> FloatArray:
 
 
 def _same_turnings(sigma: FloatArray, first: int) -> bool:
-    """Whether standard deviations (N, k) are the same about every axis."""
+    """Return whether standard deviations (N, k) are the same about every axis."""
     return sigma.ndim == 2 and bool((sigma[:, first + 1 :] == sigma[:, first : first + 1]).all())

@@ -1,4 +1,4 @@
-"""What columns are called here, for what instruments and controllers call them: one table.
+"""The table of column names: those of instruments and controllers, and ours.
 
 A heading is compared in small letters, with every run of blanks, ``_``, ``-``, ``.``, ``:`` and
 ``/`` as one blank. What makers mean different things by (``Rx``, ``A``, ``W``) has a name of its
@@ -129,7 +129,7 @@ _SIGMA = re.compile(
 
 
 def is_known(name: str) -> bool:
-    """Whether a heading, without its unit, is one that is known by itself."""
+    """Return whether a heading, without its unit, is one that is known by itself."""
     plain = _plain(name)
     return (
         bool(
@@ -161,7 +161,7 @@ def orientation_in(names: Collection[str]) -> tuple[str, ...]:
 
 
 def is_turned(names: Collection[str]) -> bool:
-    """Whether columns state an orientation, or a part of one."""
+    """Return whether columns state an orientation, or a part of one."""
     return bool(orientation_in(names)) or any(angle in names for angle in ANGLES)
 
 

@@ -42,7 +42,7 @@ _SHOWN = 8  # names of columns in a message
 
 @dataclass(frozen=True)
 class Column:
-    """One column.
+    """A column of a table.
 
     Attributes
     ----------
@@ -213,7 +213,7 @@ class Table:
         self.columns = {name: column.take(rows) for name, column in self.columns.items()}
 
     def understood(self) -> tuple[Understood, ...]:
-        """What was made of each column: those that are read, then those that are left out."""
+        """List the meaning of each column: those that are read, then those that are left out."""
         read = [(name, each) for name, each in self.columns.items()]
         found = []
         for meaning, column in [*read, *((None, each) for each in self._forgotten)]:
@@ -371,6 +371,7 @@ class Table:
             dict.fromkeys(
                 u for q in quantities for u in units.factors(q) if u.isascii() and u.isalnum()
             )
+            or quantities
         )
         if not column.unit and "1" in quantities:
             return "1", (1.0, 1.0)
@@ -467,7 +468,7 @@ class Table:
 
 
 def _number_rows(cells: Sequence[str]) -> bool:
-    """Whether cells are what tables of data frames put in front: whole numbers, no two alike."""
+    """Return whether cells are an index of a data frame: whole numbers, no two alike."""
     return all(cell.isdecimal() for cell in cells) and len({*cells}) == len(cells)
 
 

@@ -1,4 +1,4 @@
-"""Which line of a table names its columns, what a heading says, and the lines above it."""
+"""Search for the line that names a table's columns; meaning of headings and lines above."""
 
 from __future__ import annotations
 

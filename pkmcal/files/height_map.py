@@ -19,7 +19,7 @@ Row = tuple[int, list[str]]
 
 
 def is_height_map(text: str) -> bool:
-    """Whether a text begins as one does."""
+    """Return whether a text begins as one does."""
     return text.lstrip().startswith(TITLE)
 
 

@@ -17,7 +17,7 @@ Signs = tuple[str, str]  # of thousands and of decimals
 
 
 def thousands(cells: Iterable[str]) -> tuple[Signs, str] | None:
-    """What separates thousands and decimals in a column, and a cell that shows it; None: nothing.
+    """Return separators of thousands and decimals in a column, and a cell that shows it, or None.
 
     Examples
     --------
@@ -35,7 +35,7 @@ def thousands(cells: Iterable[str]) -> tuple[Signs, str] | None:
 
 
 def is_either(cell: str) -> bool:
-    """Whether a cell may be a thousand and more, or a number with decimals.
+    """Return whether a cell may be a thousand and more, or a number with decimals.
 
     Examples
     --------
@@ -75,7 +75,7 @@ def undecided(cells: Sequence[str]) -> list[tuple[int, str]]:
 
 
 def _shows(cell: str, mark: str) -> bool:
-    """Whether a mark of a cell is that of decimals and can be nothing else."""
+    """Return whether a mark of a cell is that of decimals and can be nothing else."""
     text = _straight(cell)
     signs = thousands([text])
     return (signs is not None and signs[0][1] == mark) or (

@@ -1,4 +1,4 @@
-"""Where a file comes from: the version that wrote it and the checksums of what was read."""
+"""Provenance of a file: the version that wrote it, and checksums of its sources."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a file holds, read once and up to a limit.
+"""Content of a file, read once and up to a limit.
 
 A pipe can be read only once, and a file may change between two readings: an `Input` keeps what was
 read, so that what is computed and the checksum that is stated are of the same bytes.
@@ -50,7 +50,7 @@ class Input(PathLike[str]):
         return str(self._path)
 
     def content(self, most: int) -> bytes:
-        """What the file holds.
+        """Return the file's content.
 
         Raises
         ------
@@ -67,7 +67,7 @@ class Input(PathLike[str]):
 
 
 def content(path: str | PathLike[str], most: int) -> bytes:
-    """What a file holds; of an `Input` what was read before.
+    """Return a file's content; of an `Input`, the content that was read before.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def content(path: str | PathLike[str], most: int) -> bytes:
 
 
 def _read(path: Path, most: int) -> bytes:
-    """All of a file; of one without end no more than the limit."""
+    """Read a file whole; of one without end no more than the limit."""
     if not path.exists():
         near = (each.name for each in path.parent.glob(f"*{path.suffix}"))
         raise MissingFileError(
@@ -105,7 +105,7 @@ def _read(path: Path, most: int) -> bytes:
 
 
 def _up_to(path: Path, most: int) -> bytes:
-    """What `_read` returns, of a file that is there."""
+    """Return the result of `_read` for a file that exists."""
     found = bytearray()
     with open(path, "rb", buffering=0) as file:
         expected = os.fstat(file.fileno()).st_size

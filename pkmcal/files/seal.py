@@ -20,14 +20,14 @@ _IEND = 12  # bytes that end a PNG file
 
 @dataclass(frozen=True)
 class _Form:
-    """How a seal is written, and where: after so many bytes, or before so many."""
+    """The form of a seal and its place: after so many bytes, or before so many."""
 
     written: Callable[[str], bytes]
     after: int | None = None
     before: int = 0
 
     def place(self, length: int) -> int:
-        """Where it stands in a content of this length without it."""
+        """Return the seal's place in a content of this length without it."""
         return length - self.before if self.after is None else self.after
 
 
@@ -100,7 +100,7 @@ def sealed(content: bytes, kind: str) -> bytes:
 
 
 def is_sealed(content: bytes, kind: str) -> bool:
-    r"""Whether a file is still as it was when it was sealed.
+    r"""Return whether a file is still as it was when it was sealed.
 
     Examples
     --------

@@ -17,7 +17,7 @@ _LINE = re.compile(r"[^\r\n]*(?:\r\n|\r|\n)|[^\r\n]+")
 def text_in(
     path: str | PathLike[str], errors: Literal["strict", "replace", "surrogateescape"] = "strict"
 ) -> str:
-    """What a text file says, line ends and a byte order mark as they are.
+    """Return the text of a file, with line ends and byte order mark as they are.
 
     Raises
     ------

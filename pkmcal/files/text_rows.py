@@ -59,7 +59,7 @@ class TextRows:
 
 
 def is_number(cell: str) -> bool:
-    """Whether a cell holds a number, with a point or a comma."""
+    """Return whether a cell holds a number, with a point or a comma."""
     return _NUMBER.fullmatch(cell) is not None
 
 
@@ -139,7 +139,7 @@ def _decoded(path: Path, content: bytes) -> tuple[str, list[str]]:
 
 
 def _separator(lines: list[str]) -> str:
-    """What gives most lines equally many cells."""
+    """Return the separator that gives most lines equally many cells."""
     best, most = ",", 0
     for separator in SEPARATORS:
         counts: Counter[int] = Counter()

@@ -133,7 +133,7 @@ class Source:
         return found
 
     def _statements(self) -> Iterator[tuple[int, str, dict[str, Any]]]:
-        """Each heading, and each key with its value: where it begins, its text, its data.
+        """Return headings and keys with their values: place, text and data of each.
 
         A statement ends with the line on which its brackets are closed.
         """
@@ -158,7 +158,7 @@ def _keys(heading: dict[str, Any]) -> Iterator[str]:
 
 
 def _paths(said: object, before: KeyPath) -> Iterator[KeyPath]:
-    """All keys of a statement, those of tables in its value among them."""
+    """Return the keys of a statement, those of tables in its value included."""
     if isinstance(said, dict):
         for key, value in said.items():
             yield (*before, key)

@@ -39,7 +39,7 @@ class Units:
 
 
 def shown(value: object) -> str:
-    """What was found, short enough for a message."""
+    """Shorten a text for a message."""
     if isinstance(value, bool):
         return str(value).lower()
     text = repr(dict(value) if isinstance(value, Mapping) else value)
@@ -145,7 +145,7 @@ class Table:
         return value
 
     def choice(self, key: str, known: Iterable[str], what: str) -> str:
-        """One of the `known` words; `what` names what it stands for."""
+        """Read one of the `known` words; `what` names what it stands for."""
         value = self.text(key)
         if value not in (known := tuple(known)):
             self.fail(key, f"{value!r} is no {what}{did_you_mean(value, known)}")

@@ -1,4 +1,4 @@
-"""What was made of a heading of a table."""
+"""Meaning of the headings of a table."""
 
 from __future__ import annotations
 

@@ -102,7 +102,7 @@ def factors(quantity: str) -> dict[str, tuple[float, float]]:
 
 
 def quantity_of(unit: str) -> str | None:
-    """Which of mm and rad a unit is of; None for any other word."""
+    """Return "mm" or "rad", whichever quantity a unit is of; None for any other word."""
     known = plain(unit)
     return next((quantity for quantity in ("mm", "rad") if known in UNITS[quantity]), None)
 

@@ -123,7 +123,7 @@ def _hidden(written: bytes, read: TextRows) -> Iterator[str]:
 
 
 def _part(sheet: Any) -> str:
-    """Where in the packed workbook a sheet is."""
+    """Return the part of the packed workbook that is a sheet."""
     return str(sheet._worksheet_path).lstrip("/")
 
 

@@ -65,7 +65,7 @@ class Datum:
     points: tuple[tuple[str, str], ...] = ()
 
     def asked(self, asked: Asked) -> Asked:
-        """The same calibration with these numbers held."""
+        """Return the question of this calibration with these numbers held."""
         of_points = tuple(f"{role}{name}." for role, name in self.points)
         fix = tuple(name for name in self.names if not name.startswith(of_points))
         return replace(asked, fix=(*asked.fix, *fix), held_points=frozenset(self.points))

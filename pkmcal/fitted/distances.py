@@ -11,7 +11,7 @@ from pkmcal.arrays import BoolArray, FloatArray, rms
 
 @dataclass(frozen=True)
 class Distances:
-    """Of the points that were reached, mm; NaN without any.
+    """Distances of the points that were reached, mm; NaN without any.
 
     Attributes
     ----------

@@ -26,7 +26,7 @@ _WANTED = "'outliers', 'slack' or numbers of rows"
 
 
 def left_out(drop: Drop, count: int) -> tuple[tuple[int, ...], bool, bool]:
-    """What `drop` names of measurements of so many rows.
+    """Return the rows that `drop` names, of measurements with so many rows.
 
     Returns
     -------
@@ -86,7 +86,7 @@ def held_without(
 
 
 def outlying(estimator: Estimator, estimate: Estimate) -> BoolArray:
-    """Which rows (N,) of the equations the others contradict."""
+    """Mark the rows (N,) of the equations that the others contradict."""
     equations = estimator.equations
     fitted = estimate.state.fitted.rank
     odd = outliers(

@@ -93,7 +93,7 @@ class Fit:
 
     @cached_property
     def end(self) -> Evaluation:
-        """These equations at the solution."""
+        """The equations at the solution."""
         solution = self.estimate.evaluation
         if self.equations is self.estimator.equations:
             return solution
@@ -106,14 +106,14 @@ class Fit:
 
     @cached_property
     def uncertainty(self) -> Uncertainty:
-        """How sure the numbers are; `Uncertainty.equations` are those that were fitted."""
+        """Uncertainty of the numbers; `Uncertainty.equations` are those that were fitted."""
         sure = uncertainty(self.estimator, self.estimate, self.linear, self.rule, self.classes)
         stated = self.estimator.equations.parameters.asked.uncertainty
         return with_considered(sure, self.estimate.evaluation, stated)
 
     @property
     def covariance(self) -> FloatArray:
-        """Of the reported parameters (n, n) along determined combinations, mm and rad.
+        """Covariance of the reported parameters (n, n), along determined combinations, mm and rad.
 
         inf where the noise is not known.
         """
@@ -133,7 +133,7 @@ class Fit:
         return basis[:, self.estimate.state.determined.rank :]
 
     def machine_combinations(self) -> int:
-        """How many combinations are determined that nuisance parameters do not explain.
+        """Return the number of determined combinations that nuisance parameters do not explain.
 
         Of the measurements alone, whatever a prior says.
         """

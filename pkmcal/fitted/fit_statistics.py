@@ -1,4 +1,4 @@
-"""What a fit says of itself, part by part: parameters, rank, misfit, repeats, search."""
+"""Statistics of a fit, part by part: parameters, rank, misfit, repeats, search."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def _correlation(covariance: FloatArray, known: BoolArray) -> FloatArray:
 
 
 def identifiability(estimator: Estimator, estimate: Estimate, hidden: int) -> dict[str, Any]:
-    """What the measurements alone determine; `hidden` parameters are no part of the result."""
+    """Return what measurements alone determine, without `hidden` parameters."""
     equations, measured = estimator.equations, estimate.state.measured
     chosen = equations.parameters
     names: tuple[str, ...] = ()
@@ -183,7 +183,7 @@ def repeats(uncertainty: Uncertainty) -> dict[str, Any]:
 def tested_prior(
     estimator: Estimator, estimate: Estimate, *, of_uncertain: bool = False
 ) -> PriorTest | None:
-    """Whether the measurements contradict the prior; None without one, or where nothing can tell.
+    """Test measurements against the prior; None without one, or where nothing can tell.
 
     Or, `of_uncertain`, the stated uncertainty of numbers that were fitted along. What is known
     otherwise is an equation like the measurements. A robust fit's prior is not tested.

@@ -1,4 +1,4 @@
-"""How readings follow numbers that a fit held: their columns beside those of its design."""
+"""Columns, beside the design, of numbers that a fit held."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class HeldNumbers:
     spread: FloatArray
 
     def matrix(self) -> FloatArray:
-        """All columns, (M, k)."""
+        """Return the columns, (M, k)."""
         return np.concatenate([some for _, some in self.columns()])
 
 

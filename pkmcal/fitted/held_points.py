@@ -59,13 +59,13 @@ class HeldFamily:
 
     @property
     def contradicts(self) -> bool:
-        """Whether they contradict the fit, a few points that are off among them."""
+        """True if held-out points contradict the fit, the few that are far off included."""
         tests = (self.test, self.together) if self.together is not None else (self.test,)
         return all(each is not None and each.contradicts for each in tests)
 
     @property
     def agrees_otherwise(self) -> bool:
-        """Whether the points that are not off are as expected."""
+        """True if the points that are not off are as expected."""
         return self.rms_without_outliers <= RATIO * self.expected
 
 
@@ -98,7 +98,7 @@ class Points:
 
     @property
     def known(self) -> BoolArray:
-        """Of which equations the noise is known."""
+        """Mask of equations of known noise."""
         return np.isfinite(self.reading)
 
     def by_fit(self, uncertainty: Uncertainty) -> FloatArray:
@@ -184,7 +184,7 @@ def points(
 
 
 def _families(measured: Measurements, uncertainty: Uncertainty, like: int) -> list[tuple[int, int]]:
-    """Of each component (k,) its family, and the one of the fitted set that has its noise.
+    """Return each component's family (k,), and that of the fitted set with its noise.
 
     That of the same unit. Where a reading of one family is compared with a fit that has none of
     its unit the first, as arcs; -1 where nothing is known.
@@ -228,7 +228,7 @@ def _of_actuators(
 
 
 def odd_rows(points: Points, row: IntArray, count: int, uncertainty: Uncertainty) -> BoolArray:
-    """Which rows (N,) are further off than noise and covariance explain.
+    """Mark the rows (N,) that are further off than noise and covariance explain.
 
     The noise is an estimate itself, as good as that of the fitted rows.
     """
@@ -276,7 +276,7 @@ def _each_unit(points: Points) -> Iterator[tuple[str, BoolArray]]:
 def families(
     points: Points, named: Labels, good: BoolArray, odd: BoolArray, uncertainty: Uncertainty
 ) -> Iterator[HeldFamily]:
-    """Each family of the rows that were reached (M,); `odd` (M,) are equations of rows that are."""
+    """Return families of equations (M,) that were reached; `odd` (M,) are of outlying rows."""
     by_fit = points.by_fit(uncertainty)
 
     def rms(squares: FloatArray, of: BoolArray) -> float:
@@ -302,7 +302,7 @@ def families(
 
 
 def _without_sigma(points: Points, uncertainty: Uncertainty) -> bool:
-    """Whether some of the fitted sets that these are like state no sigma."""
+    """Return whether some of the fitted sets that these are like state no sigma."""
     sets = uncertainty.equations.table.sets
     return any(stated_variances(sets[i]) is None for i in set(points.like[points.known].tolist()))
 

@@ -105,14 +105,14 @@ class HeldOut(ReadOnly):
 
     @property
     def holdout_contradicting(self) -> tuple[HeldFamily, ...]:
-        """What contradicts the fit, and not only through a few points that are far off."""
+        """Evidence of held-out points against the fit that a few distant points do not explain."""
         few = 0 < len(self.holdout_outliers) <= _FEW_ODD * int(np.isfinite(self.holdout_off).sum())
         found = [each for each in self.holdout_families if each.contradicts]
         return tuple(each for each in found if not (few and each.agrees_otherwise))
 
     @property
     def holdout_contradicts(self) -> bool:
-        """Whether the points contradict the fit, and not only through a few that are far off."""
+        """True if the points contradict the fit, and not only through a few that are far off."""
         return bool(self.holdout_contradicting)
 
     @property
@@ -123,7 +123,7 @@ class HeldOut(ReadOnly):
 
     @property
     def holdout_chance(self) -> float:
-        """How likely such a rms would be if fit, noise and covariance were right."""
+        """Chance of such a rms if fit, noise and covariance were right."""
         return float("nan") if self.holdout_test is None else self.holdout_test.chance
 
 

@@ -51,7 +51,7 @@ class Later:
 
     @property
     def own(self) -> BoolArray:
-        """Which parameters the fit has not (n,)."""
+        """Mask of parameters that the fit has not (n,)."""
         own: BoolArray = self.fitted == NONE
         return own
 
@@ -66,7 +66,7 @@ class Later:
         return columns
 
     def equations(self, fitted: Equations) -> Equations:
-        """Their equations, weighted as those of the fit."""
+        """The equations of the later rows, weighted as those of the fit."""
         deviations = [
             np.ones(len(data.measured.components))
             if differs(fitted, data, i)
@@ -88,13 +88,13 @@ def later(fitted: Parameters, held: Sequence[tuple[FitData, int]]) -> Later:
 
 
 def differs(fitted: Equations, data: FitData, like: int) -> bool:
-    """Whether kind or stated sigma of a set are not those of the fitted set."""
+    """Return whether kind or stated sigma of a set are not those of the fitted set."""
     own, of_fit = data.measured, fitted.table.sets[like]
     return own.kind != of_fit.kind or (own.sigma is None) != (of_fit.sigma is None)
 
 
 def noise_factors(rows: Later, equations: Equations, sure: Uncertainty) -> FloatArray:
-    """What multiplies the deviations of each group of their equations."""
+    """Return factors of the deviations of each group of these equations."""
     factors = []
     for data, i in zip(rows.data, rows.like, strict=True):
         if not differs(sure.equations, data, i):
@@ -110,7 +110,7 @@ def noise_factors(rows: Later, equations: Equations, sure: Uncertainty) -> Float
 
 @dataclass(frozen=True, eq=False)
 class OwnNumbers:
-    """How the rows' d own parameters follow from them, scaled.
+    """The rows' d own parameters as functions of the rows, scaled.
 
     Attributes
     ----------

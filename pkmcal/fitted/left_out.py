@@ -1,4 +1,4 @@
-"""Whether an effect helps where nothing was fitted: each pose left out, with it and without.
+"""Evidence for an effect from poses left out in turn, with it and without.
 
 By the linear model at the solution, so that no fit is repeated: an effect is judged by poses that
 took no part. It may be one that the fit does not have, or one that it has.
@@ -55,7 +55,7 @@ class Comparison:
 
     @property
     def passes(self) -> bool:
-        """Whether the effect helps, beyond what chance does."""
+        """True if the effect helps, beyond what chance does."""
         return self.after <= (1.0 - LEAST_GAIN) * self.before and self.t > LEAST_T
 
     def __str__(self) -> str:

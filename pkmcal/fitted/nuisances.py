@@ -40,7 +40,7 @@ class Nuisance:
 
     @property
     def moved(self) -> bool:
-        """Whether it moved so far that it is part of the result."""
+        """True if the number moved so far that it is part of the result."""
         return abs(self.value - self.start) > _MOVED * self.stated
 
 
@@ -81,7 +81,7 @@ def nuisances(
 
 
 def in_result(chosen: Parameters, beside: tuple[Nuisance, ...]) -> BoolArray:
-    """Which parameters (n,) are part of the result."""
+    """Mark parameters (n,) that are part of the result."""
     far = {each.name for each in beside if each.moved}
     return np.array([
         not own or name in far for name, own in zip(chosen.names, chosen.uncertain, strict=True)

@@ -126,7 +126,7 @@ def _squares(
 
 
 def _median(freedom: FloatArray | IntArray) -> FloatArray:
-    """Of χ², nearly (E. B. Wilson and M. M. Hilferty, The distribution of chi-square, 1931)."""
+    """Return the median of χ², nearly (Wilson and Hilferty, 1931)."""
     given = np.asarray(freedom, dtype=np.float64)
     median: FloatArray = given * (1.0 - 2.0 / (9.0 * given)) ** 3
     return median

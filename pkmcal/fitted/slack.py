@@ -111,7 +111,7 @@ def _odd_poses(equations: Equations, estimate: Estimate) -> tuple[IntArray, floa
 def _without_each(
     equations: Equations, estimate: Estimate, poses: IntArray
 ) -> tuple[FloatArray, FloatArray]:
-    """By how much each closure left out lowers the squares of some poses (P, equations).
+    """Return the fall of the squares of some poses without each closure, (P, equations).
 
     And how much longer it then reads than needed, whitened. The poses are found anew, for long
     slack moves them far; the geometry is held.
@@ -163,7 +163,7 @@ def taut(
 
 
 def _longer(equations: Equations, estimate: Estimate) -> tuple[FloatArray, FloatArray]:
-    """By how much cables read longer than needed (K, equations), whitened, and redundancy."""
+    """Return the excess lengths of cables (K, equations), whitened, and their redundancy."""
     root = np.sqrt(np.repeat(estimate.weights, equations.blocks.components))
     taken = root[:, None] * estimate.change(estimate.half)
     every = np.ones(len(estimate.weights))  # what a robust loss sets aside is looked at as well
@@ -177,7 +177,7 @@ def _longer(equations: Equations, estimate: Estimate) -> tuple[FloatArray, Float
 def slack_cables(
     equations: Equations, estimate: Estimate, cells: Sequence[Cell]
 ) -> tuple[SlackCable, ...]:
-    """What cells are in words and mm, at poses found without them, the longest first."""
+    """List slack cables in words and mm, at poses found without them, the longest first."""
     if not cells:
         return ()
     evaluation = estimate.evaluation
@@ -205,7 +205,7 @@ def listed_slack(cables: Sequence[SlackCable]) -> str:
 
 
 def _pulling(equations: Equations) -> BoolArray:
-    """Which closures are of a cable, (equations,)."""
+    """Mark closures of cables, (equations,)."""
     robot = equations.parameters.robot
     if not isinstance(robot, Robot) or robot.model.chains is not None:
         return np.zeros(equations.machines.equations, dtype=bool)
@@ -221,7 +221,7 @@ def _pulling(equations: Equations) -> BoolArray:
 
 
 def _slopes(equations: Equations, evaluation: Evaluation) -> FloatArray:
-    """By how much cables lengthen with what is read (K, equations), negative for reversed ones."""
+    """Return slopes of cable lengths by readings (K, equations), negative if reversed."""
     actuators = equations.machines.actuators
 
     def slopes(robot: Calibratable, poses: IntArray) -> FloatArray:

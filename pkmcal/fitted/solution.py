@@ -273,7 +273,7 @@ class Solution(HeldOut, Generic[Machine]):
 
     @property
     def read(self) -> BoolArray:
-        """Of which fitted rows (N,) more is known than where the actuators were."""
+        """Mask of fitted rows (N,) of which more is known than where the actuators were."""
         read: BoolArray = self.fit.equations.table.count > 0
         return read
 
@@ -284,7 +284,7 @@ class Solution(HeldOut, Generic[Machine]):
 
     @property
     def left_out(self) -> str:
-        """Which rows were left out as asked, in words; "" where none were."""
+        """The rows that were left out as asked, in words; "" where none were."""
         count = len(self.dropped) + len(self.holdout_dropped)
         names = ", ".join(filter(None, (self.dropped_names, self.holdout_dropped_names)))
         many = f"{count} rows were" if count > 1 else "1 row was"
@@ -319,5 +319,5 @@ class Solution(HeldOut, Generic[Machine]):
         return self.chi2_per_dof
 
     def to_dict(self) -> dict[str, Any]:
-        """All attributes by name, as JSON files hold them."""
+        """Return all attributes by name, as JSON files hold them."""
         return {name: getattr(self, name) for name in _NAMES}

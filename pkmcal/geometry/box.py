@@ -33,7 +33,7 @@ def read_box(table: Table) -> Box:
 
 
 def both(own: Box, other: Box) -> Box:
-    """What two boxes have in common.
+    """Return the common part of two boxes.
 
     Raises
     ------
@@ -52,7 +52,7 @@ def both(own: Box, other: Box) -> Box:
 
 
 def in_box(box: Box, poses: FloatArray) -> BoolArray:
-    """Which poses (..., 6) are inside."""
+    """Mark poses (..., 6) that are inside."""
     inside = np.ones(poses.shape[:-1], dtype=bool)
     for name, (low, high) in box.items():
         across = name == RADIUS

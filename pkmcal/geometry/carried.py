@@ -1,4 +1,4 @@
-"""What the platform of a machine that yields carries, and what pulls at its tool."""
+"""The load on the platform of a machine that yields, and on its tool."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ CARRIED = (
 
 @dataclass(frozen=True, eq=False)
 class Load:
-    """What a machine that yields carries in place of the payload that its file states.
+    """A load on a machine that yields, in place of the payload that its file states.
 
     Each may be one for all rows of a call, or have the leading shape of its rows.
 

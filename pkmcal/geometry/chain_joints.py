@@ -68,17 +68,17 @@ class Joint:
 
     @property
     def ball(self) -> bool:
-        """Whether it is an S that has no axes of its own."""
+        """True if the joint is an S without stated axes."""
         return self.kind == "S" and not self.axes
 
     @property
     def parts(self) -> int:
-        """How many axes it has."""
+        """Number of axes."""
         return {"R": 1, "P": 1, "U": 2, "C": 2, "S": 3}[self.kind]
 
     @property
     def unit(self) -> Unit:
-        """Of what it turns or slides."""
+        """Unit of the joint's coordinate."""
         return "mm" if self.kind == "P" else "rad"
 
 
@@ -118,7 +118,7 @@ def error_unit(name: str) -> Unit:
 
 
 def ball_axes(limb: tuple[Joint, ...], k: int) -> tuple[FloatArray, ...]:
-    """Of a ball that is not the last joint: along the limb and across it, never near its lock."""
+    """Return axes of a ball before the last joint: along the limb and across, far from its lock."""
     way = towards(limb, k)
     along = np.array([0.0, 0.0, 1.0]) if way is None else way
     return (along, *across(along))

@@ -78,7 +78,7 @@ class Chains:
 
     @cached_property
     def actuated(self) -> tuple[tuple[int, Joint], ...]:
-        """Of each actuator the first limb that has it, and the joint it moves."""
+        """The first limb of each actuator, and the joint that it moves."""
         found: dict[int, tuple[int, Joint]] = {}
         for i, limb in enumerate(self.limbs):
             for joint in limb:
@@ -103,7 +103,7 @@ class Chains:
 
     @property
     def arms(self) -> tuple[tuple[Joint, float], ...]:
-        """Of each actuator its joint, and how far from its axis the next joint elsewhere is, mm."""
+        """The joint of each actuator, and the distance of the next joint from its axis, mm."""
         found = []
         for i, joint in self.actuated:
             limb = self.limbs[i]
@@ -118,7 +118,7 @@ class Chains:
 
     @cached_property
     def members(self) -> tuple[tuple[str, ...], ...]:
-        """Of each limb the names of its parts, without a last ball."""
+        """The names of each limb's parts, without a last ball."""
         return tuple(
             tuple(
                 self.name_of(i, k) + suffix
@@ -185,7 +185,7 @@ class Chains:
 
     @cached_property
     def _places(self) -> dict[str, int]:
-        """Where the six errors of each part and end begin, and offset and gain of each actuator."""
+        """Places of the six errors of each part and end, and of each actuator's offset and gain."""
         names: list[tuple[str, int]] = [(name, 6) for name in self.parts]
         ends: dict[str, int] = {}
         for i, limb in enumerate(self.limbs):
@@ -206,7 +206,7 @@ class Chains:
         return ends
 
     def _soft(self, part: Part) -> float:
-        """How much a part yields: nothing behind the platform, and a ball before it as one."""
+        """Return how much a part yields: nothing behind the platform, a ball before it as one."""
         limb = self.limbs[part.limb]
         behind = [id(joint) for joint in limb[len(limb) - self.tail :]]
         if id(part.joint) in behind:
@@ -219,12 +219,12 @@ class Chains:
         return () if joint.law is None else joint.law.numbers(a + 1, joint.unit)
 
     def _law_start(self, a: int) -> int:
-        """Where the numbers of an actuator's law begin, behind those of the core."""
+        """Return the place of an actuator's law numbers, behind those of the core."""
         return self.count + sum(len(self._law_numbers(before)) for before in range(a))
 
     @property
     def count(self) -> int:
-        """How many numbers the core has of the machine, those that are always 0 included."""
+        """Number of the machine's numbers in the core, those that are always 0 included."""
         return self._places["drive1"] + 2 * self.n_actuators
 
     @cached_property
@@ -255,12 +255,12 @@ class Chains:
 
     @property
     def size(self) -> float:
-        """What rounding is measured against, mm."""
+        """Size by which rounding is measured, mm."""
         every = np.array([joint.at for limb in self.limbs for joint in limb])
         return float(max(np.abs(every).sum(axis=1).max(), np.abs(self.home[:3]).sum(), self.length))
 
     def dependent(self, limb: int) -> bool:
-        """Whether passive joints of a limb can move at home while the platform stands still."""
+        """Return whether passive joints can move at home while the platform stands still."""
         joints = self.limbs[limb]
         end = joints[-1].at if joints[-1].ball else self.home[:3]
         columns = []

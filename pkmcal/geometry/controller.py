@@ -13,7 +13,7 @@ FIRMWARES = ("klipper", "reprap", "marlin", "hangprinter", "maslow")
 
 @dataclass(frozen=True)
 class Controller:
-    """What a robot file says of its controller.
+    """Statements of a robot file about its controller.
 
     Attributes
     ----------
@@ -27,7 +27,7 @@ class Controller:
     file: str = ""
 
     def command(self, robot: str) -> str:
-        """What writes a robot file for it, on the command line."""
+        """Return the options that write a robot file for the controller."""
         config = f" --config {quote(self.file)}" if self.file else ""
         out = quote(self.new)
         return f"pkmcal export {quote(robot)} --as {self.firmware}{config} --out {out}"
@@ -39,7 +39,7 @@ class Controller:
 
 
 def read_controller(table: Table) -> Controller:
-    """What a table ``[controller]`` says."""
+    """Read a table ``[controller]``."""
     table.only(("firmware", "file"))
     firmware = table.choice("firmware", FIRMWARES, "firmware")
     return Controller(firmware, table.text("file") if "file" in table else "")

@@ -1,4 +1,4 @@
-"""What of a machine yields, and what pulls at it: compliances, masses, loads, balancers.
+"""Elastic numbers of a machine, and its loads: compliances, masses, loads, balancers.
 
 A compliance belongs to a number of the geometry: under a force Q the number is c Q longer. The
 values are numbers of the geometry themselves; this module says which there are and where.
@@ -47,7 +47,7 @@ class Spring:
 
 @dataclass(frozen=True)
 class Elastic:
-    """What yields, in the order of the core, and what pulls.
+    """Elastic numbers, in the order of the core, and the loads.
 
     Attributes
     ----------
@@ -101,10 +101,10 @@ def _point(name: str, unit: Unit) -> dict[str, Unit]:
 
 
 def is_kinematic(name: str) -> bool:
-    """Whether a number is one of the limbs or ties some, and none of loads or of what yields."""
+    """Return whether a number is one of a limb, or ties some; not of loads or compliances."""
     return not is_elastic(name) and not is_of_load(name)
 
 
 def is_elastic(name: str) -> bool:
-    """Whether a number of the geometry is a compliance, or of what pulls at the machine."""
+    """Return whether a number of the geometry is a compliance, or of what pulls at the machine."""
     return name.startswith(_GROUPS)

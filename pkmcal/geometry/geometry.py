@@ -27,7 +27,7 @@ Array = TypeVar("Array", bound=NDArray[Any])
 
 
 class _Layout:
-    """What stays the same when values are replaced: names, units, ties, places in the slots."""
+    """The layout that stays when values are replaced: names, units, ties, places in slots."""
 
     def __init__(
         self,
@@ -168,12 +168,12 @@ class Geometry:
 
     @property
     def numbers(self) -> tuple[LimbNumber, ...]:
-        """What each limb number is: its limb, its slot and its tie."""
+        """The limb, slot and tie of each limb number."""
         return self._layout.numbers
 
     @property
     def tied(self) -> BoolArray:
-        """Which names are driven by parameters, (p,)."""
+        """Names that parameters drive, (p,)."""
         return self._layout.tied
 
     @property
@@ -188,7 +188,7 @@ class Geometry:
 
     @property
     def blank(self) -> FloatArray:
-        """What the core takes where no number is, (n_limbs, columns)."""
+        """The slots' content where no number is, (n_limbs, columns)."""
         return self._layout.blank
 
     @cached_property
@@ -204,7 +204,7 @@ class Geometry:
         return _frozen(chain)
 
     def driven(self, places: IntArray) -> tuple[Int32Array, FloatArray | None]:
-        """What numbers at `places` (k,) drive: places in `slots`, c of them, and how (c, k).
+        """Return the slots driven by numbers at `places` (k,): c places in `slots`, factors (c, k).
 
         None: each drives one, in the same order.
         """

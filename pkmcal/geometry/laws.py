@@ -23,7 +23,7 @@ class LawNumber(NamedTuple):
 
 @dataclass(frozen=True)
 class Law:
-    """What lies between an actuator's reading and its drive, apart from its numbers.
+    """A law between an actuator's reading and its drive, apart from its numbers.
 
     Attributes
     ----------

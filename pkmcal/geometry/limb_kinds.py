@@ -21,7 +21,7 @@ POINT_SLOTS = SLOTS[:6]
 
 @dataclass(frozen=True)
 class LimbKind:
-    """What a robot file says about one kind of limb.
+    """A kind of limb, as a robot file states it.
 
     Attributes
     ----------
@@ -84,17 +84,17 @@ class LimbKind:
 
     @property
     def has_branch(self) -> bool:
-        """Whether the inverse has two branches to choose from."""
+        """True if the inverse has two branches to choose from."""
         return self.driver in ("slider", "crank")
 
     @property
     def has_zero(self) -> bool:
-        """Whether the direction in which an angle about the base axis is 0 can be stated."""
+        """True if the direction in which an angle about the base axis is 0 can be stated."""
         return self.driver in ("crank", "pulley")
 
     @property
     def has_points(self) -> bool:
-        """Whether it runs over several points of the base, with whole numbers of parts."""
+        """True if the cable runs over several points of the base, with whole numbers of parts."""
         return self.driver == "tackle"
 
     def axes_of(self, couple: bool) -> dict[str, str]:

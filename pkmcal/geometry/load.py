@@ -1,4 +1,4 @@
-"""What acts on the platform of a machine on cables, and what these must and may pull."""
+"""The load on the platform of a machine on cables, and limits of the cables' tensions."""
 
 from __future__ import annotations
 
@@ -54,12 +54,12 @@ class CableLoad:
 
     @property
     def numbers(self) -> dict[str, float]:
-        """Their values, N and mm."""
+        """Values of the load's numbers, N and mm."""
         values = (*self.force, *self.at, *self.cells)
         return dict(zip(self.units, values, strict=False))
 
     def with_numbers(self, numbers: Mapping[str, float]) -> CableLoad:
-        """The same with the numbers of a geometry."""
+        """Return the load with the numbers of a geometry."""
         if not self.balance:
             return self
         fx, fy, fz, x, y, z, *cells = (numbers[name] for name in self.units)
@@ -67,7 +67,7 @@ class CableLoad:
 
 
 def is_of_load(name: str) -> bool:
-    """Whether a number of the geometry is one of the load."""
+    """Return whether a number of the geometry is one of the load."""
     return name.startswith("load.")
 
 

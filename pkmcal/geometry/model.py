@@ -1,4 +1,4 @@
-"""What a robot file says, as data: limbs, pose map, home, geometry. No kinematics."""
+"""A robot file as data: limbs, pose map, home, geometry. No kinematics."""
 
 from __future__ import annotations
 
@@ -193,7 +193,7 @@ class Model:
             object.__setattr__(self, "load", self.load.with_numbers(dict(self.geometry.items())))
 
     def with_geometry(self, geometry: Geometry) -> Model:
-        """The same with other numbers: `replace` for the steps of a search, ten times as fast."""
+        """Return the model with other numbers: `replace` for a search, ten times as fast."""
         other = object.__new__(Model)
         other.__dict__.update(vars(self), geometry=geometry)
         other.__post_init__()
@@ -201,7 +201,7 @@ class Model:
 
     @property
     def rigid(self) -> Model:
-        """The same without what yields and what pulls."""
+        """Return the model without elastic numbers and loads."""
         if self.elastic is None:
             return self
         free = tuple(name for name in self.free if not is_elastic(name))
@@ -237,7 +237,7 @@ class Model:
 
     @property
     def driven(self) -> bool:
-        """Whether any drive has a law beside its gain and offset."""
+        """True if any drive has a law beside its gain and offset."""
         return any(law is not None for law in self.laws)
 
     @property
@@ -258,7 +258,7 @@ class Model:
 
     @property
     def own_width(self) -> int:
-        """How many numbers a limb has in the geometry's slots, apart from those of drive laws."""
+        """Number of a limb's slots in the geometry, apart from those of drive laws."""
         return len(SLOTS) + 3 * max(
             (len(limb.parts) - 1 for limb in self.limbs if limb.parts), default=0
         )

@@ -1,4 +1,4 @@
-"""Where a printer's bed probe is, as its firmware states it: `[probe]` of a robot file.
+"""Place of a printer's bed probe, as its firmware states it: `[probe]` of a robot file.
 
 It touches the bed at the nozzle's x and y plus the first two numbers, and the nozzle is then the
 third above the bed. Klipper's x_offset, y_offset and z_offset and RepRapFirmware's G31 X Y Z are

@@ -57,7 +57,7 @@ def builtin_names(folder: str = "machines") -> tuple[str, ...]:
 
 
 def is_built_in(robot: str) -> bool:
-    """Whether this is the name of a built-in machine."""
+    """Return whether this is the name of a built-in machine."""
     return robot in _builtin()
 
 

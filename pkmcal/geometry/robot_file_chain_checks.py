@@ -1,4 +1,4 @@
-"""What machines of chains cannot be: joints that contradict each other, or too many of them."""
+"""Errors of chain files: joints that contradict each other, or too many of them."""
 
 from __future__ import annotations
 

@@ -223,7 +223,7 @@ def _joint(
 
 
 def _cone(table: Table, kind: str) -> tuple[float | None, FloatArray | None]:
-    """How far a U or an S bends, rad, and from which direction; None: from home."""
+    """Return the bend of a U or an S, rad, and its zero direction; None: from home."""
     if "cone" not in table:
         return None, None
     axis: FloatArray | None = None

@@ -1,4 +1,4 @@
-"""What yields and what pulls, in a robot file: ``[compliance]``, masses, ``[payload]``, springs.
+"""Elastic numbers and loads of a robot file: compliances, masses, payload, springs.
 
 Compliances are in mm/N and rad/(N mm), stiffnesses in N/mm and N m/rad, masses in kg, forces in N
 and moments in N mm, whatever the file's units; places and angles are in its units.
@@ -39,7 +39,7 @@ class _Yields(NamedTuple):
 def read_elastic(
     top: Table, described: Sequence[Table], limbs: Limbs, parameters: Parameters
 ) -> tuple[Elastic | None, Limbs]:
-    """What a file says of elasticity, and the limbs with its numbers behind theirs.
+    """Read the elastic numbers of a file, and the limbs with them behind their own.
 
     None, and the limbs as they are, where the file says nothing of it.
     """
@@ -159,7 +159,7 @@ def _spring(limbs: Limbs, name: str) -> Spring:
 
 
 def _place(limbs: Limbs, number: LimbNumber) -> int:
-    """Where a number is among those of the core."""
+    """Return the place of a number among those of the core."""
     if number.place is not None:
         return number.place
     width = len(SLOTS) if limbs.blank is None else limbs.blank.shape[1]
@@ -206,7 +206,7 @@ class _Numbers:
     def read(
         self, table: Table, key: str, unit: Unit, name: str, default: float | None = None
     ) -> None:
-        """One number, which is not negative unless it has the unit of a place."""
+        """Read a number, not negative unless it has the unit of a place."""
         value = table[key] if default is None else table.data.get(key, default)
         self._put(table, key, unit, name, value)
         if unit in ("kg", "N/mm") and self.entries[name].value < 0.0:

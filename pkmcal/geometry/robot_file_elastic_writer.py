@@ -1,4 +1,4 @@
-"""What yields and what pulls, written so that `robot_file_elastic` reads the last bit of it."""
+"""Elastic numbers and loads, written so that `robot_file_elastic` reads the same bits."""
 
 from __future__ import annotations
 

@@ -106,7 +106,7 @@ class _Edit:
             self._comment(table[key], mine)
 
     def limb(self, table: Any, limb: Limb, i: int) -> None:
-        """One limb, key by key."""
+        """Write a limb, key by key."""
         numbers = {n.slot: n for n in self._new.numbers if n.limb == i and n.tie is None}
         kind = KINDS[limb.kind]
         for point in ("base", "platform"):

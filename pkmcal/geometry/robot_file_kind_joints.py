@@ -68,7 +68,7 @@ def joints_of_kind(
 
 
 def _at_home(table: Table, limb: Limb, entries: dict[str, Entry], home: FloatArray) -> _Home:
-    """Where the limb is with the platform at home; refused where it does not get there."""
+    """Return the limb with the platform at home; refuse it where it does not get there."""
     numbers = np.array([entries[slot].value if slot in entries else 0.0 for slot in SLOTS])
     value = dict(zip(SLOTS, numbers, strict=True))
     still = numbers.copy()
@@ -107,7 +107,7 @@ def _at_home(table: Table, limb: Limb, entries: dict[str, Entry], home: FloatArr
 
 
 def _check_plane(table: Table, limb: Limb, at: _Home) -> None:
-    """In the plane limbs move in it: chains know nothing beside it."""
+    """Check that limbs of a plane machine move in it: chains know nothing beside it."""
     driver = KINDS[limb.kind].driver
     if driver == "crank":
         out = float(np.linalg.norm(at.axes["base"][:2]))

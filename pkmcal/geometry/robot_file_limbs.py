@@ -272,7 +272,7 @@ def _over(table: Table) -> list[list[object]]:
 
 
 def _parts(table: Table) -> tuple[int, ...]:
-    """How many parts of a cable run from its base point, and from each behind it."""
+    """Return numbers of cable parts from the base point, and from each point behind it."""
     count = 1 + len(_over(table))
     what = "whole numbers, of base and of each point under over"
     found = table.list_of("parts", count, what) if "parts" in table else [1] * count

@@ -1,4 +1,4 @@
-"""What is stated of numbers that a calibration does not look for: how wrong they may be.
+"""Stated uncertainty of numbers that a calibration does not look for.
 
 ``[uncertainty]`` of a robot file, and the argument `uncertainty` of `identify`: a standard
 deviation by name or wildcard. Under ``common`` all numbers that it matches are wrong by one and
@@ -62,7 +62,7 @@ class StatedUncertainty:
         return tuple(dict.fromkeys([*self.own, *self.common, *self.consider]))
 
     def with_later(self, other: StatedUncertainty) -> StatedUncertainty:
-        """These entries, and behind them those of another statement."""
+        """Append the entries of another statement."""
         return StatedUncertainty(
             _behind(self.own, other.own),
             _behind(self.common, other.common),
@@ -125,7 +125,7 @@ def _behind(first: Mapping[str, float], later: Mapping[str, float]) -> dict[str,
 
 
 def of_geometry(pattern: str, names: Iterable[str]) -> bool:
-    """Whether a pattern is of numbers of the geometry, and not of frames, points or instruments."""
+    """Return whether a pattern is of the geometry, not of frames, points or instruments."""
     return any(fnmatchcase(name, pattern) for name in names) or not _BESIDE.fullmatch(pattern)
 
 

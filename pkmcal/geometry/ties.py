@@ -25,7 +25,7 @@ class Term(NamedTuple):
 
 
 class Tie(NamedTuple):
-    """How a limb number follows from its terms.
+    """A tie: a limb number as a function of its terms.
 
     ``"equal"``: one term. ``"cos"`` and ``"sin"``: two terms, a radius and an angle, the number
     being radius·cos(angle) or radius·sin(angle).
@@ -47,7 +47,7 @@ class Tie(NamedTuple):
         return first * (math.cos(angle[0]) if self.rule == "cos" else math.sin(angle[0]))
 
     def derivatives(self, parameters: Mapping[str, float]) -> Iterator[tuple[str, float]]:
-        """Each parameter of the tie with the derivative of the number to it."""
+        """Return each parameter of the tie with the number's derivative by it."""
         first, *angle = (_term_value(term, parameters) for term in self.terms)
         if self.rule == "equal":
             slopes: tuple[float, ...] = (1.0,)

@@ -46,7 +46,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Sources:
-    """What was read of a calibration.
+    """Files of a calibration as they were read.
 
     Attributes
     ----------
@@ -202,7 +202,7 @@ def _anew(job: Calibration) -> list[str]:
 
 
 def _unknown(job: Calibration, sources: Sources) -> dict[Role, Known | list[Known]]:
-    """What ``--frame``, ``--target`` and ``--attachment`` say of each file."""
+    """Return the unknowns by ``--frame``, ``--target`` and ``--attachment``, for each file."""
     return {
         "frame": _known("--frame", job.frame, job, sources),
         "target": _known("--target", job.target, job, sources),
@@ -211,13 +211,13 @@ def _unknown(job: Calibration, sources: Sources) -> dict[Role, Known | list[Know
 
 
 def _known(option: str, text: str, job: Calibration, sources: Sources) -> Known | list[Known]:
-    """One word for all files, or one for each."""
+    """Return words, one for all files or one for each."""
     words = [word(option, part.strip(), KNOWN) for part in text.split(",")]
     return words[0] if len(words) == 1 else _for_sets(option, words, job, sources)
 
 
 def _for_sets(option: str, given: Sequence[T], job: Calibration, sources: Sources) -> list[T]:
-    """What is said of each file, for each set of measurements."""
+    """Return the words of each file, for each set of measurements."""
     if len(given) != len(job.files):
         what = "names" if option == "--session" else "words"
         raise ArgumentError(f"{option}: {len(given)} {what} for {len(job.files)} files")

@@ -93,7 +93,7 @@ class Calibration(Stated):
 
     @classmethod
     def of_table(cls, table: Mapping[str, Any], refuse: Refuse | None = None) -> Calibration:
-        """What the tables machine, measured and fit say; others are not looked at.
+        """Read the tables machine, measured and fit; others are not looked at.
 
         Raises
         ------
@@ -114,7 +114,7 @@ class Calibration(Stated):
         )
 
     def in_folder(self, folder: str) -> Calibration:
-        """The same with its relative paths below a folder: those of a project file."""
+        """Return the job with its relative paths, those of a project file, below a folder."""
         found = replace(super().in_folder(folder), reading=self.reading.in_folder(folder))
         found = replace(found, robot=in_folder(self.robot, folder))
         if self.held_file is not None:
@@ -159,13 +159,13 @@ class Calibration(Stated):
 
     @property
     def sources(self) -> tuple[object, ...]:
-        """What reading depends on: two calibrations of the same need to be read only once."""
+        """Statements that reading depends on: equal ones need to be read only once."""
         return self.robot, self.files, self.reading, self.held_file
 
 
 @dataclass(frozen=True)
 class Writing(Stated):
-    """What `pkmcal calibrate` writes: the options of that.
+    """Outputs of `pkmcal calibrate`: its options for them.
 
     Attributes
     ----------

@@ -42,7 +42,7 @@ class Importing(Stated):
 
     @classmethod
     def of_table(cls, table: Mapping[str, Any], refuse: Refuse | None = None) -> Importing:
-        """What the table import says; others are not looked at.
+        """Read the table import; others are not looked at.
 
         Raises
         ------

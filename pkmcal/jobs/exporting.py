@@ -27,7 +27,7 @@ _IN_A_FILE = ("klipper", "maslow", "reprap", "hangprinter")  # of the user's
 
 @dataclass(frozen=True)
 class Exported:
-    """What was written.
+    """The files that were written.
 
     Attributes
     ----------

@@ -110,7 +110,7 @@ def read_coefficients(option: str, given: Sequence[str]) -> float | Mapping[str,
 def read_prior(
     given: Sequence[str], robot: Calibratable, names: Sequence[str]
 ) -> float | Mapping[str, float | tuple[float, float]] | None:
-    """What ``--prior`` states: deviations, and functions of numbers as "|base1 - base2|=3000±1".
+    """Read ``--prior``: deviations, and functions such as "|base1 - base2|=3000±1".
 
     Raises
     ------
@@ -138,7 +138,7 @@ def read_prior(
 def read_uncertainty(
     given: Sequence[str], consider: Sequence[str], robot: Calibratable
 ) -> dict[str, float | Mapping[str, float]]:
-    """What ``--uncertainty`` and ``--consider`` state, as `identify` takes it.
+    """Read ``--uncertainty`` and ``--consider``, as `identify` takes them.
 
     Raises
     ------

@@ -48,7 +48,7 @@ def write(job: Importing, printer: Printer, inputs: Inputs, force: bool) -> list
 
 
 def tables(printer: Printer) -> dict[str, Measurements]:
-    """What was measured, by the file it is written to."""
+    """Return the measurements by the file to which they are written."""
     stored = printer.measurements
     places = stored is not None and not stored.components
     found = {"belts.csv" if places else "probe.csv": stored, "distances.csv": printer.distances}

@@ -1,4 +1,4 @@
-"""What a verb reads: each file once, so that its files state the checksums of what was read."""
+"""Files of a verb, each read once, so that outputs state the checksums of what was read."""
 
 from __future__ import annotations
 
@@ -49,11 +49,11 @@ class Inputs:
 
     @property
     def paths(self) -> list[Path]:
-        """Where the files are."""
+        """Paths of the files."""
         return [Path(each) for each in self._files.values()]
 
     def contents(self) -> dict[str, bytes]:
-        """What was read, by name; a built-in machine by its own."""
+        """Return the contents by name; of a built-in machine by its own name."""
         machines = (robot_file.located(name) for name in self._built_in)
         return {place: content for content, place, _ in machines} | {
             name: each.content(MOST_TABLE) for name, each in self._files.items()

@@ -33,7 +33,7 @@ def carrying(
 
 
 def loads_by_tool(texts: list[str] | None) -> dict[int, Load]:
-    """What the machine carries with each tool."""
+    """Return the load that the machine carries with each tool."""
     found: dict[int, Load] = {}
     for text in texts or ():
         match = _TOOL.fullmatch(text.strip())

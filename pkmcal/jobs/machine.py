@@ -27,7 +27,7 @@ class OfMachine(Stated):
 
     @classmethod
     def of_table(cls: type[M], table: Mapping[str, Any], refuse: Refuse | None = None) -> M:
-        """What the table machine and its own say; others are not looked at.
+        """Read the table machine and the table of this job; others are not looked at.
 
         Raises
         ------
@@ -39,7 +39,7 @@ class OfMachine(Stated):
         return cls(robot, **cls.values_of_table(*of(table, cls.TABLE, refuse)))
 
     def in_folder(self: M, folder: str) -> M:
-        """The same with its relative paths below a folder: those of a project file."""
+        """Return the job with its relative paths, those of a project file, below a folder."""
         return replace(super().in_folder(folder), robot=in_folder(self.robot, folder))
 
 
@@ -49,7 +49,7 @@ def machine_table(robot: str) -> dict[str, str]:
 
 
 def machine_of_table(table: Mapping[str, Any], refuse: Refuse) -> str:
-    """What the table of a machine says: the name of a built-in machine, or a file; or nothing."""
+    """Read the table of a machine: a built-in machine's name, a file, or nothing."""
     for key, value in table.items():
         if key not in ("builtin", "file"):
             refuse(key, f"unknown key {key!r} of [machine]; it has builtin or file")
@@ -63,7 +63,7 @@ def machine_of_table(table: Mapping[str, Any], refuse: Refuse) -> str:
 
 
 def is_built_in(robot: str) -> bool:
-    """Whether this is the name of a built-in machine."""
+    """Return whether this is the name of a built-in machine."""
     folders = resources.files("pkmcal") / "builtin"
     files = (folders / kind / f"{robot}.toml" for kind in ("machines", "arms"))
     return not {"/", "\\", "\0"} & set(robot) and any(file.is_file() for file in files)

@@ -53,7 +53,7 @@ class Planning(OfMachine):
         return command("plan", [self.robot], self.options())
 
     def in_folder(self, folder: str) -> Planning:
-        """The same with its relative paths below a folder: those of a project file."""
+        """Return the job with its relative paths, those of a project file, below a folder."""
         found = super().in_folder(folder)
         board = self.board
         if board is None or not is_file(board):

@@ -42,7 +42,7 @@ DRAWN, _SHARE = 500, 0.9  # candidates where none are given, and how far out the
 
 @dataclass(frozen=True)
 class Sources:
-    """What was read of a plan.
+    """Files of a plan as they were read.
 
     Attributes
     ----------
@@ -126,7 +126,7 @@ def files(job: Planning) -> list[str]:
 
 
 def kinds_of(job: Planning) -> Kind | dict[Kind, int]:
-    """What is measured: one kind, or how many poses of each of several.
+    """Return the kinds to be measured: one, or several with the number of poses of each.
 
     Raises
     ------
@@ -144,7 +144,7 @@ def kinds_of(job: Planning) -> Kind | dict[Kind, int]:
 
 
 def _kinds(text: str) -> Kind | dict[Kind, int]:
-    """One kind, or how many poses of each of several."""
+    """Return one kind, or the number of poses of each of several."""
     if "=" not in text:
         return word("--kind", text, PLANNED)
     found: dict[Kind, int] = {}
@@ -194,7 +194,7 @@ def _of_plan(option: str, text: str, name: str, kinds: Kind | dict[Kind, int]) -
 
 
 def _by_kind(option: str, found: dict[str, Any]) -> Any:
-    """What is for all, or a mapping of kinds to what is theirs; None of nothing."""
+    """Return the value for all, or a mapping of kinds to their own; None of nothing."""
     if "" in found and len(found) > 1:
         raise ArgumentError(f"{option}: one without a kind stands alone, for all")
     return found.get("", found or None)

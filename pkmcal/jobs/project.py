@@ -26,7 +26,7 @@ _ESCAPES = {'"': '\\"', "\\": "\\\\", "\n": "\\n", "\t": "\\t", "\r": "\\r"}
 
 @dataclass(frozen=True)
 class Project:
-    """What a project file says.
+    """The content of a project file.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class Project:
         object.__setattr__(self, "plan", replace(self.plan, robot=self.calibration.robot))
 
     def table(self) -> dict[str, Any]:
-        """What the file says, in plain values."""
+        """Return the content of the file in plain values."""
         importing = {} if self.importing is None else self.importing.table()
         targets = {"export": {"as": list(self.targets)}} if self.targets else {}
         return {
@@ -79,7 +79,7 @@ class Project:
 
     @classmethod
     def of_table(cls, table: Mapping[str, Any], refuse: Refuse | None = None) -> Project:
-        """What a table says.
+        """Read a table.
 
         Raises
         ------
@@ -109,7 +109,7 @@ class Project:
 
     @classmethod
     def of_text(cls, text: str | bytes, place: str = "project.toml") -> Project:
-        """What a file says, whose mistakes are told with file, line and key.
+        """Read the text of a file; mistakes are told with file, line and key.
 
         Raises
         ------
@@ -129,7 +129,7 @@ class Project:
         return cls.of_table(source.data, refuse)
 
     def in_folder(self, folder: str | Path) -> Project:
-        """The same with its relative paths below a folder."""
+        """Return the project with its relative paths below a folder."""
         folder = str(folder)
         importing = None if self.importing is None else self.importing.in_folder(folder)
         calibration, plan = self.calibration.in_folder(folder), self.plan.in_folder(folder)

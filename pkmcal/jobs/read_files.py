@@ -193,7 +193,7 @@ def _offset(text: str) -> list[float]:
 
 
 def _columns(path: str, inputs: Inputs) -> dict[str, Any]:
-    """What the file of ``--columns`` says.
+    """Read the file of ``--columns``.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""How files of measurements are read, as options and tables say it."""
+"""How files of measurements are read: one object for options and tables."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pkmcal.jobs.stated import PathText, Refuse, Stated, below
 
 @dataclass(frozen=True)
 class Reading(Stated):
-    """How files are read: the options of that of `pkmcal calibrate` and `pkmcal check`.
+    """Reading of files: the options of `pkmcal calibrate` and `pkmcal check` for it.
 
     Attributes
     ----------
@@ -70,7 +70,7 @@ class Reading(Stated):
 
     @property
     def names(self) -> dict[str, str]:
-        """What is read as what."""
+        """The names of columns, and what each is read as."""
         return dict(map(_renamed, self.rename))
 
     def table(self) -> dict[str, Any]:
@@ -99,7 +99,7 @@ class Reading(Stated):
         return tuple(board for _, board in map(named, self.board) if is_file(board))
 
     def in_folder(self, folder: str) -> Reading:
-        """The same with its relative paths below a folder."""
+        """Return the options with their relative paths, those of a project file, below a folder."""
 
         def there(text: str) -> str:
             name, file = named(text)
@@ -117,7 +117,7 @@ def named(text: str) -> tuple[str, str]:
 
 
 def is_file(board: str) -> bool:
-    """Whether a board is a file of one's own points, not a word that describes it."""
+    """Tell a board that is a file of one's own points from a word that describes it."""
     return board.lower().endswith(".csv")
 
 

@@ -1,4 +1,4 @@
-"""What options say, as frozen dataclasses: a command line, a table of a project file, and back.
+"""Options as frozen dataclasses: to a command line, to a table of a project file, and back.
 
 Nothing here needs more than the standard library, so that a server can hold such objects without
 the time and memory of a numerical package.
@@ -72,7 +72,7 @@ class Stated:
 
     @classmethod
     def of_table(cls: type[S], table: Mapping[str, Any], refuse: Refuse | None = None) -> S:
-        """What a table says.
+        """Read a table.
 
         Parameters
         ----------
@@ -101,7 +101,7 @@ class Stated:
         }
 
     def in_folder(self: S, folder: str) -> S:
-        """The same with its relative paths below a folder."""
+        """Return the options with relative paths below a folder."""
         changed = {}
         for each in fields(self):  # type: ignore[arg-type]
             value = getattr(self, each.name)

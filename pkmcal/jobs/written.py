@@ -18,7 +18,7 @@ from pkmcal.kinematics.robot import Robot
 
 @dataclass(frozen=True)
 class Written:
-    """Where a calibration is written to; made before it is computed, for what would be refused.
+    """Outputs of a calibration; made before it is computed, for what would be refused.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What calibration asks of a machine, and the adapter through which serial arms answer it."""
+"""The interface that calibration asks of a machine, and its adapter for serial arms."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ class Solved(Protocol):
 
     @property
     def ok(self) -> BoolArray:
-        """Which rows have a pose, (N,)."""
+        """Mask of rows that have a pose, (N,)."""
 
 
 class SolvedRows(Solved, Protocol):
-    """The same with the reason where a row failed."""
+    """Solved rows with the reason where a row failed."""
 
     @property
     def status(self) -> Int32Array:
@@ -57,18 +57,18 @@ class NamedNumbers(Protocol):
 
     @property
     def units(self) -> Sequence[str]:
-        """Their units: "mm", "rad" or "1"."""
+        """Units of the numbers: "mm", "rad" or "1"."""
 
     @property
     def values(self) -> FloatArray:
-        """Their values (p,)."""
+        """Values of the numbers (p,)."""
 
     def match(self, patterns: str | Iterable[str], argument: str = "") -> list[str]:
         """Names that names and wildcards choose."""
 
 
 class FreeByDefault(Protocol):
-    """What a robot file declares."""
+    """The declarations of a robot file."""
 
     @property
     def free(self) -> tuple[str, ...]:
@@ -76,7 +76,7 @@ class FreeByDefault(Protocol):
 
     @property
     def uncertainty(self) -> StatedUncertainty:
-        """How wrong numbers may be that it does not look for."""
+        """Stated uncertainty of numbers that a calibration does not look for."""
 
 
 class Calibratable(Protocol):
@@ -84,11 +84,11 @@ class Calibratable(Protocol):
 
     @property
     def name(self) -> str:
-        """Its name."""
+        """Name of the machine."""
 
     @property
     def length(self) -> float:
-        """Its characteristic length, mm: an angle counts as its arc there."""
+        """Characteristic length of the machine, mm: an angle counts as its arc there."""
 
     @property
     def n_actuators(self) -> int:
@@ -108,17 +108,17 @@ class Calibratable(Protocol):
 
     @property
     def model(self) -> FreeByDefault:
-        """What its file declares."""
+        """The declarations of its file."""
 
     @property
     def yields(self) -> bool:
-        """Whether something of it follows what it carries."""
+        """True if a number of the machine follows its load."""
 
     def replace(self, changes: FloatArray) -> Calibratable:
         """A machine with other numbers (p,), checked as those of a file are."""
 
     def with_values(self, values: FloatArray) -> Calibratable:
-        """The same for the steps of a search: quickly, for numbers near the present ones."""
+        """Return the machine for a step of a search: quickly, for numbers near the present ones."""
 
     def forward(self, q: FloatArray, guess: FloatArray | None = None) -> SolvedRows:
         """Poses at actuator coordinates (N, n)."""
@@ -135,7 +135,7 @@ class Calibratable(Protocol):
 
 @dataclass(frozen=True)
 class ArmModel:
-    """What an arm declares: all its joint errors are free, what its joints add is held."""
+    """The declarations of an arm: joint errors are free, what its joints add is held."""
 
     free: tuple[str, ...]
     uncertainty: StatedUncertainty = NOTHING
@@ -150,7 +150,7 @@ class ArmPoses:
 
     @property
     def ok(self) -> BoolArray:
-        """Which rows have a pose."""
+        """Mask of rows that have a pose."""
         return np.equal(self.status, _OK)
 
 
@@ -174,11 +174,11 @@ class ArmMachine:
 
     @property
     def yields(self) -> bool:
-        """Whether a joint follows what the tool carries."""
+        """True if a joint yields to the load at the tool."""
         return self.arm.laws is not None and self.arm.laws.yielding
 
     def replace(self, changes: FloatArray) -> ArmMachine:
-        """With other joint errors (6 n,) and numbers of its joints' laws, mm and rad."""
+        """Return the arm with other joint errors (6 n,) and numbers of joint laws, mm and rad."""
         of_joints = 6 * self.n_actuators
         arm = self.arm.replace(changes[:of_joints].reshape(-1, 6))
         if arm.laws is not None:
@@ -186,15 +186,15 @@ class ArmMachine:
         return ArmMachine(arm)
 
     def approaching(self, approach: FloatArray) -> ArmMachine:
-        """With joints that come from there (N, n)."""
+        """Return the arm for joints that come from these coordinates (N, n)."""
         return ArmMachine(self.arm.approaching(approach))
 
     def under(self, load: Load) -> ArmMachine:
-        """With what the tool carries, one for all rows or one each."""
+        """Return the arm under a load at the tool, one for all rows or one each."""
         return ArmMachine(self.arm.under(load))
 
     def with_values(self, values: FloatArray) -> ArmMachine:
-        """The same as `replace`, which is quick here."""
+        """Return `replace` of these values, which is quick here."""
         return self.replace(values)
 
     def forward(self, q: ArrayLike, guess: ArrayLike | None = None) -> ArmPoses:
@@ -215,7 +215,7 @@ class ArmMachine:
         return np.concatenate([by_errors, self.arm.law_jacobian(actuators, "tip")], axis=-1)
 
     def actuator_twists(self, pose: ArrayLike, actuators: ArrayLike) -> FloatArray:
-        """The same by each joint coordinate, (N, 6, n)."""
+        """Return the tool's twists by each joint coordinate, (N, 6, n)."""
         return self.arm.jacobian(actuators, frame="tip")
 
     def commanded(self, places: ArrayLike) -> tuple[FloatArray, FloatArray, tuple[int, ...]]:

@@ -77,7 +77,7 @@ def _value(
 
 
 def passive_coordinate(chains: Chains, i: int, k: int) -> int:
-    """Which of the passive coordinates joint k of limb i has, its first part's."""
+    """Return the passive coordinate of joint k of limb i, of its first part."""
     name = chains.name_of(i, k) + PARTS[0]
     return int(chains.layout.coordinate[list(chains.parts).index(name)])
 
@@ -93,20 +93,20 @@ def home_axes(machine: ChainMachine) -> FloatArray:
 
 
 def _turned(machine: ChainMachine, frames: FloatArray) -> FloatArray:
-    """What the bodies have turned by since home: before each joint, and of each end."""
+    """Return rotations since home of the body before each joint, and of each end."""
     R = frames[..., :9].reshape(*frames.shape[:2], 3, 3)
     found: FloatArray = R @ home_axes(machine).swapaxes(1, 2)
     return found
 
 
 def _platform(machine: ChainMachine, own: FloatArray) -> FloatArray:
-    """What the platform has turned by since home, (N, 3, 3)."""
+    """Return the platform's rotation since home, (N, 3, 3)."""
     found: FloatArray = from_pose(np.nan_to_num(own))[:, :3, :3] @ machine.layout.home[:3, :3].T
     return found
 
 
 def bend_direction(limb: tuple[Joint, ...], k: int) -> FloatArray:
-    """What a cone of joint k limits, at home: of a U its normal, of an S the limb."""
+    """Return the direction that a cone of joint k limits, at home: a U's normal, an S's limb."""
     joint = limb[k]
     if joint.kind == "U":
         direction = np.cross(joint.axes[0], joint.axes[1])
@@ -117,7 +117,7 @@ def bend_direction(limb: tuple[Joint, ...], k: int) -> FloatArray:
 
 
 def cone_axes(limb: tuple[Joint, ...], k: int) -> tuple[FloatArray, FloatArray]:
-    """What a cone of joint k compares, at home: a direction of the body before it, one behind."""
+    """Return what a cone of joint k compares, at home: directions of the bodies on either side."""
     direction, middle = bend_direction(limb, k), limb[k].cone_axis
     if middle is None:
         return direction, direction
@@ -125,7 +125,7 @@ def cone_axes(limb: tuple[Joint, ...], k: int) -> tuple[FloatArray, FloatArray]:
 
 
 def _bend(limb: tuple[Joint, ...], k: int, before: FloatArray, after: FloatArray) -> FloatArray:
-    """How far a joint bends from the middle of its cone, rad."""
+    """Return the angle of a joint from the middle of its cone, rad."""
     one, other = cone_axes(limb, k)
     a, b = before @ one, after @ other
     return np.asarray(np.arctan2(np.linalg.norm(np.cross(a, b), axis=-1), (a * b).sum(axis=-1)))

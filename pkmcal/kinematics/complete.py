@@ -52,10 +52,10 @@ def matched_coordinates(match: bool | str | Sequence[str], moved: Sequence[str])
 
 
 class Completing(Protocol):
-    """What is asked of a robot."""
+    """The interface that completion asks of a robot."""
 
     def violation(self, pose: FloatArray) -> FloatArray:
-        """How far poses are from those it can take, mm."""
+        """Return how far poses are from those the machine can take, mm."""
 
     def complete(self, pose: FloatArray) -> FloatArray:
         """The poses that keep the coordinates which its file declares."""
@@ -190,7 +190,7 @@ def complete(
 def in_working_mode(
     machine: AnyCompiled, slots: FloatArray, own: FloatArray, q: FloatArray
 ) -> BoolArray:
-    """Whether limbs at actuators (N, n) are in the working mode in which the inverse has them."""
+    """Return whether limbs at actuators (N, n) are in the working mode of the inverse."""
     way, there = (machine.drives(slots, each) for each in (q, machine.inverse(slots, own, q)))
     missed = machine.struct.closure_tolerance if machine.rows > machine.m else 0.0
     most = max(OTHER_BRANCH * machine.struct.size, 10.0 * missed)

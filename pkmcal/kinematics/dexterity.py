@@ -1,4 +1,4 @@
-"""How well a machine moves at poses: conditioning, distance from singularities, transmission."""
+"""Quality of motion at poses: conditioning, distance from singularities, transmission."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _SUMMARY = (np.min, np.median, np.max)
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Dexterity(Result):
-    """How well closures hold poses, for poses of any leading shape; NaN out of reach.
+    """Dexterity: how well closures hold poses of any leading shape; NaN out of reach.
 
     The singular values are those of the closures by a twist of the platform, rotations as their
     arc at ``robot.length``: how far the joints part in mm when the platform yields by 1 mm.
@@ -133,7 +133,7 @@ def _measures(robot: Robot, poses: FloatArray) -> FloatArray:
 def _tail_transmission(
     robot: Robot, own: FloatArray, q: FloatArray, slopes: FloatArray
 ) -> FloatArray:
-    """What of the motion of each tail joint no other actuator does, the least; (N,).
+    """Return the least share of a tail joint's motion that no other actuator makes, (N,).
 
     With more than six actuators others can always do it, and this says nothing: infinite.
     """
@@ -155,7 +155,7 @@ def _tail_transmission(
 
 
 def _chain_transmission(robot: Robot, by_q: FloatArray, slopes: FloatArray) -> FloatArray:
-    """How much of an actuator's motion, at its arm, reaches the closures that it moves."""
+    """Return the share of an actuator's motion, at its arm, that reaches its closures."""
     chains = robot.model.chains
     assert chains is not None
     arms = slopes * [1.0 if joint.unit == "mm" else arm for joint, arm in chains.arms]

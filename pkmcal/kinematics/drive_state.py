@@ -1,4 +1,4 @@
-"""What a machine depends on beside what its actuators read: how these came there, and its load."""
+"""State of drives beside their readings: how the actuators came there, and their load."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ M = TypeVar("M")
 
 
 class DriveState(NamedTuple):
-    """Of each actuator, and of the platform, at N rows; None where nothing is known.
+    """The state of each actuator, and of the platform, at N rows; None where it is unknown.
 
     Attributes
     ----------
@@ -33,7 +33,7 @@ class DriveState(NamedTuple):
     load: FloatArray | None = None
 
     def at(self, rows: IntArray | np.intp) -> DriveState:
-        """That of some rows, or of one."""
+        """Return the state of some rows, or of one."""
         return DriveState(*(None if each is None else each[rows] for each in self))
 
     def of(self, machine: M) -> M:

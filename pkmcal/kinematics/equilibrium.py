@@ -51,7 +51,7 @@ class Equilibrium:
 def equilibrium(
     robot: Robot, pose: FloatArray, tension: FloatArray, load: CableLoad, places: IntArray
 ) -> Equilibrium:
-    """What is left of forces at poses (N, 6) under tensions (N, c) of cables, a limb each.
+    """Return the missing force at poses (N, 6) under tensions (N, c) of cables, a limb each.
 
     `places` (p,) are those of numbers in ``robot.geometry.names``.
     """
@@ -81,7 +81,7 @@ def equilibrium(
 
 
 def balance(robot: Robot, pose: FloatArray, load: CableLoad) -> tuple[FloatArray, FloatArray]:
-    """What tensions of 1 pull at poses (N, m, c), and what the cables should pull (N, m)."""
+    """Return the wrench of unit tensions at poses (N, m, c), and the wrench to balance (N, m)."""
     own, arcs = np.ascontiguousarray(robot.frames.inward(pose)), _arcs(robot)
     ways = robot.cable_machine.ways_at(robot.slots, own, np.empty(0, dtype=np.int32))[0]
     return (ways / arcs).transpose(0, 2, 1), pulls_of_load(robot, own, load.force, load.at)

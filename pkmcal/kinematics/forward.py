@@ -18,19 +18,19 @@ from pkmcal.result import RowResult
 
 
 class Solved(Protocol):
-    """What a result asks of the machine it comes from; `Kinematics` describes each."""
+    """The interface that a result asks of its machine; `Kinematics` describes each member."""
 
     def closure_by_twist(self, own: FloatArray, q: FloatArray | None = None) -> FloatArray:
         """Closure rows by a scaled twist, (N, rows, m); q by default the inverse of the poses."""
 
     def in_working_mode(self, own: FloatArray, q: FloatArray) -> BoolArray:
-        """Whether limbs are on the branches of the file at own poses (N, 6) and q (N, n)."""
+        """Return whether limbs are on the branches of the file at own poses (N, 6) and q (N, n)."""
 
     def assembly_problem(self, q: FloatArray) -> AssemblyProblem:
         """The closures at coordinates (N, n)."""
 
     def passive_joints(self, own: FloatArray, q: FloatArray) -> FloatArray:
-        """What the passive joints turn or slide by from home at own poses (N, 6), (N, passive)."""
+        """Return passive joints' ways from home at own poses (N, 6), (N, passive)."""
 
 
 @dataclass(eq=False, repr=False)  # a frozen one takes a microsecond more to make
@@ -85,7 +85,7 @@ class Forward(RowResult):
 
     @cached_property
     def same_side(self) -> BoolArray:
-        """Whether no singularity must lie between the guess and the pose (...).
+        """True where no singularity must lie between the guess and the pose (...).
 
         Computed when asked for: the determinant has the sign it has at the guess, with the
         actuators that lead there, and each limb in closed form is on the branch that its file
@@ -119,7 +119,7 @@ class Forward(RowResult):
 
     @cached_property
     def passive(self) -> FloatArray:
-        """What passive joints turn or slide by from home (..., passive), computed when asked for.
+        """Return passive joints' ways from home (..., passive), computed when asked for.
 
         rad or mm, in the order of ``robot.passive_names``. NaN where the row was not solved.
 
@@ -132,7 +132,7 @@ class Forward(RowResult):
         return found.reshape(*self.status.shape, found.shape[-1])
 
     def failures(self) -> str:
-        """What failed and where, in one line; empty where nothing did."""
+        """Describe in one line what failed and where; empty where nothing did."""
         said = super().failures()
         if not said or self._guess.ndim > 1 or not np.isfinite(self._guess).all():
             return said

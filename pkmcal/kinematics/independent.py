@@ -55,7 +55,7 @@ def independent_numbers(robot: Robot) -> tuple[str, ...]:
 
 
 def _independent(columns: FloatArray) -> list[int]:
-    """Which columns are taken. LAPACK's exchanges decide between equal ones by rounding."""
+    """Choose independent columns; LAPACK's exchanges decide between equal ones by rounding."""
     left = np.asarray(np.linalg.qr(columns, mode="r"))
     found: list[int] = []
     least = INDEPENDENT * float(np.linalg.norm(left, axis=0).max(initial=0.0))

@@ -45,7 +45,7 @@ _FOLLOWS = 0.3  # of what follows the free coordinates most: a coordinate that d
 
 
 class Kinematics:
-    """What a `Robot` computes at its present geometry: poses, actuators and their rates.
+    """The kinematics of a `Robot` at its present geometry: poses, actuators and their rates.
 
     Parameters
     ----------
@@ -278,7 +278,7 @@ class Kinematics:
 
     @property
     def turns(self) -> FloatArray:
-        """How far each actuator goes in a whole turn, (n,): rad, infinite where it is no angle.
+        """Way of each actuator in a whole turn, (n,): rad, infinite where it is no angle.
 
         A coordinate and the same with whole turns added are one position of the machine.
         """
@@ -536,7 +536,7 @@ class Kinematics:
         return tuple(names[k] for k in order if coordinate[k] >= 0)
 
     def passive_joints(self, own: FloatArray, q: FloatArray) -> FloatArray:
-        """What the passive joints turn or slide by from home at own poses (N, 6), (N, passive).
+        """Return passive joints' ways from home at own poses (N, 6), (N, passive).
 
         Each chain closed for itself, in the posture that is reached from home. Swivels of pulleys
         turn from the direction `zero` of their limb.
@@ -556,7 +556,7 @@ class Kinematics:
         return machine.bare(slots, q)
 
     def chain_points(self, own: FloatArray, q: FloatArray) -> list[FloatArray]:
-        """Where the joints of each chain are at own poses (N, 6), in own axes: (N, joints, 3)."""
+        """Return the joints of each chain at own poses (N, 6), in own axes: (N, joints, 3)."""
         machine, slots, at = self.bare_at(own, q)
         assert isinstance(machine, ChainMachine) and self.model.chains is not None
         frames = machine.frames(slots, np.ascontiguousarray(own), at)[1]
@@ -577,7 +577,7 @@ class Kinematics:
         return self.machine.closure(self.slots, own, q).by_step
 
     def in_working_mode(self, own: FloatArray, q: FloatArray) -> BoolArray:
-        """Whether limbs are on the branches of the file at own poses (N, 6) and q (N, n).
+        """Return whether limbs are on the branches of the file at own poses (N, 6) and q (N, n).
 
         Chains, which the inverse has in the posture that is reached from home, count as such.
         """
@@ -612,7 +612,7 @@ class Kinematics:
         return np.where(allowed, near, end)
 
     def _in_strokes(self, q: FloatArray) -> BoolArray:
-        """Which actuators (n,) keep the strokes of all their limbs at coordinates (n,)."""
+        """Mark actuators (n,) that keep the strokes of all their limbs at coordinates (n,)."""
         inside = np.ones(self.n_actuators, dtype=bool)
         drives = self.machine.drives(self.slots, q[None])[0]
         for (actuator, stroke, unit), drive in zip(self._strokes(), drives, strict=True):

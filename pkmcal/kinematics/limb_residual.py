@@ -1,4 +1,4 @@
-"""How badly geometries explain measured poses: an objective for a swarm, compiled."""
+"""Misfit of geometries to measured poses: an objective for a swarm, compiled."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which limits of which limbs a pose keeps: reach, strokes and joint cones."""
+"""Limits of limbs at poses: reach, strokes and joint cones."""
 
 from __future__ import annotations
 
@@ -56,12 +56,12 @@ class Feasibility(Result):
 
     @property
     def ok(self) -> BoolArray:
-        """Whether every limb keeps every limit, (...)."""
+        """True where every limb keeps every limit, (...)."""
         kept = self.reach & self.stroke & self.base_cone & self.platform_cone
         return np.asarray(kept.all(axis=-1) & self.workspace)
 
     def broken(self) -> list[str]:
-        """What is broken, one line per limit and limb, or the tail, over all poses."""
+        """List broken limits, a line for each limit and limb, or the tail, over all poses."""
         lines = []
         outside = np.flatnonzero(~self.workspace.reshape(-1))
         if outside.size:
@@ -77,7 +77,7 @@ class Feasibility(Result):
         return lines
 
     def is_tail(self, column: int) -> bool:
-        """Whether a column, counted from 0, is that of the tail."""
+        """Return whether a column, counted from 0, is that of the tail."""
         return self.tail and column == self.reach.shape[-1] - 1
 
     def _parts(self) -> Iterator[str | Table]:
@@ -134,13 +134,13 @@ def feasibility(
 
 
 def margin_of(stroke: tuple[float, float] | None, drive: FloatArray) -> FloatArray:
-    """How far inside a stroke each q̃ (N,) is; infinite where none is stated."""
+    """Return the distance of each q̃ (N,) from the ends of its stroke; infinite without one."""
     low, high = stroke or (-np.inf, np.inf)
     return np.minimum(drive - low, high - drive)
 
 
 def kept(margin: FloatArray, unit: Unit, size: float) -> BoolArray:
-    """Whether limits are kept with these margins, rounding apart: a pose at a limit keeps it.
+    """Return whether limits are kept with these margins, up to rounding.
 
     Examples
     --------

@@ -32,7 +32,7 @@ class LoadedMachine(RestingMachine):
 
     @cached_property
     def _compiled(self) -> bool:
-        """Whether the core has it: nothing pulls but at the platform, by weights and forces."""
+        """True if the core computes it: loads at the platform alone, weights and forces."""
         elastic = self.pulls.elastic
         if type(self.inner) is not Machine or elastic.balancers or elastic.anchors:
             return False
@@ -220,7 +220,7 @@ class LoadedMachine(RestingMachine):
 
     @property
     def reading_rows(self) -> IntArray:
-        """Which row of `readings` is that of each coordinate."""
+        """Row of `readings` for each coordinate."""
         within = self.inner.inner if isinstance(self.inner, DrivenMachine) else self.inner
         return within.reading_rows
 
@@ -271,7 +271,7 @@ class LoadedMachine(RestingMachine):
         return self.inner.bare(self.rigid(slots), q)
 
     def turns(self, slots: FloatArray) -> FloatArray:
-        """How far each actuator goes in a whole turn, (n,); infinite where it is no angle."""
+        """Return the way of each actuator in a whole turn, (n,); infinite where it is no angle."""
         return self.inner.turns(self.rigid(slots))
 
     def reference(self, slots: FloatArray) -> FloatArray:
@@ -284,11 +284,11 @@ class LoadedMachine(RestingMachine):
 
     @property
     def turning(self) -> BoolArray:
-        """Which drives are angles, (drives,)."""
+        """Mask of drives that are angles, (drives,)."""
         return self.inner.turning
 
     def slopes(self, slots: FloatArray, q: FloatArray) -> FloatArray:
-        """How far the drives go by their actuators at coordinates (N, n), (N, drives)."""
+        """Differentiate the drives by their actuators at coordinates (N, n), (N, drives)."""
         return self.inner.slopes(self.rigid(slots), q)
 
     def at_drives(self, slots: FloatArray, way: FloatArray) -> FloatArray:
@@ -296,7 +296,7 @@ class LoadedMachine(RestingMachine):
         return self.inner.at_drives(self.rigid(slots), way)
 
     def spheres(self, slots: FloatArray, q: FloatArray) -> FloatArray:
-        """What the limbs are at coordinates (N, n), as `pkmcal.core.machine.Machine.spheres`."""
+        """Return limbs' spheres at coordinates (N, n), as `pkmcal.core.machine.Machine.spheres`."""
         assert isinstance(self.inner, Machine | DrivenMachine)
         return self.inner.spheres(self.rigid(slots), q)
 

@@ -22,7 +22,7 @@ _DEPENDENT = 1e-2  # of unit rows: what errors of the geometry make of rows that
 
 @dataclass(frozen=True, eq=False)
 class RowRoles:
-    """What the rows of `readings` are to a machine whose actuators are read.
+    """Roles of the rows of `readings` for a machine whose actuators are read.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class RowRoles:
 
 
 def surplus(robot: Robot) -> int:
-    """How many actuators a machine has beyond the ways in which its platform can move.
+    """Return the number of actuators beyond the platform's degrees of freedom.
 
     What they read can contradict itself. Closures beyond the free coordinates alone do not make it:
     of an over-constrained machine they are those of passive joints, which give way, and the pose
@@ -144,7 +144,7 @@ def readings_by_tension(robot: Robot, pose: FloatArray) -> FloatArray:
 
 
 def sphere_actuators(robot: Robot) -> list[int]:
-    """Which actuator each row of `readings` is of; -1 for rows beside a limb's own."""
+    """Return the actuator of each row of `readings`; -1 for rows beside a limb's own."""
     if robot.model.chains is not None:
         return [*range(robot.n_actuators), *[-1] * (robot.machine.rows - robot.n_actuators)]
     of_rows: list[int] = []

@@ -1,4 +1,4 @@
-"""Where all cables of a machine pull: under its load, or against what holds it at home."""
+"""Poses at which all cables pull, under their load or against what holds them at home."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _SOME = 1e-3  # N: with a force of 1 N
 
 
 def on_cables(robot: Robot) -> bool:
-    """Whether every limb is a cable."""
+    """Return whether every limb is a cable."""
     limbs = robot.model.limbs
     return robot.model.chains is None and all(KINDS[limb.kind].cable for limb in limbs)
 
@@ -42,7 +42,7 @@ def along(axis: str) -> CableLoad:
 
 
 def pulled(robot: Robot, poses: FloatArray) -> BoolArray:
-    """At which poses (N, 6) no cable would have to push; at all where no load is known."""
+    """Mark poses (N, 6) where no cable would have to push; all where no load is known."""
     load = load_of(robot)
     everywhere = np.ones(len(poses), dtype=bool)
     return everywhere if load is None else can_pull(robot, poses, load)

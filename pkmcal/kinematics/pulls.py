@@ -1,4 +1,4 @@
-"""What pulls at a machine at a pose: weights, payload, force of the tool, balancers.
+"""Loads on a machine at a pose: weights, payload, force of the tool, balancers.
 
 All of it is in the machine's own axes, N and N mm, of rows of poses at once. A weight that moves
 with the platform is part of the wrench on it; one that sits on a limb pulls at its numbers.
@@ -19,7 +19,7 @@ _NOWHERE = np.zeros(6)
 
 
 class Pulls:
-    """What pulls at a machine, by the numbers of `Elastic` and by what it carries.
+    """The loads on a machine, by the numbers of `Elastic` and by what it carries.
 
     Parameters
     ----------
@@ -39,11 +39,11 @@ class Pulls:
         self._down = _frame(gravity / self._strength) if self._strength else np.eye(3)
 
     def has(self, name: str) -> bool:
-        """Whether the robot file states this number."""
+        """Return whether the robot file states this number."""
         return name in self._index
 
     def place(self, name: str) -> int:
-        """Where a number is among those of `Elastic`."""
+        """Return the place of a number among those of `Elastic`."""
         return self._index[name]
 
     def gravity(self, numbers: FloatArray) -> FloatArray:
@@ -56,7 +56,7 @@ class Pulls:
     def summed(
         self, numbers: FloatArray, carried: FloatArray | None, slots: FloatArray
     ) -> FloatArray:
-        """All weights and the force at the tool, as numbers of the platform, (16,) or (N, 16).
+        """Sum weights and tool force as numbers of the platform, (16,) or (N, 16).
 
         Σ m r [kg mm], Σ m [kg], gravity [N/kg], the tool [mm], the force there [N], a moment
         [N mm]: points in the platform's own axes, the rest in the machine's. `numbers` are those

@@ -1,4 +1,4 @@
-"""How far the numbers of a machine that yields give, where it comes to rest under its load.
+"""Deflection of a machine's elastic numbers where it comes to rest under its load.
 
 A compliance c belongs to a number e of the geometry. What pulls does Q = Tᵀw on it at held
 actuators, T the twist of the platform by e and w the wrench on it, and e is c Q more: the loaded
@@ -80,23 +80,23 @@ class RestingMachine(CoreMachine):
 
     @property
     def struct(self) -> Any:
-        """Of C, of the machine within."""
+        """C struct of the machine within."""
         return self.inner.struct
 
     def with_tolerance(self: R, closure_tolerance: float) -> R:
-        """The same with another `closure_tolerance`, mm."""
+        """Return a copy of the machine with another `closure_tolerance`, mm."""
         return self._with(inner=self.inner.with_tolerance(closure_tolerance))
 
     def approaching(self: R, approach: FloatArray) -> R:
-        """The same with actuators that come from a direction, (n,) or (N, n)."""
+        """Return the machine for actuators that come from a direction, (n,) or (N, n)."""
         return self._with(inner=self.inner.approaching(approach))
 
     def tensioned(self: R, tension: FloatArray) -> R:
-        """The same with tensions of what actuators drive, (n,) or (N, n)."""
+        """Return the machine under tensions of what the actuators drive, (n,) or (N, n)."""
         return self._with(inner=self.inner.tensioned(tension))
 
     def carrying(self: R, carried: FloatArray) -> R:
-        """The same with what it carries, (10,) or (N, 10)."""
+        """Return the machine with another load, (10,) or (N, 10)."""
         return self._with(carried=carried)
 
     def _with(self: R, **changed: object) -> R:
@@ -123,7 +123,7 @@ class RestingMachine(CoreMachine):
         return self._given(slots, np.where(np.isfinite(given), given, 0.0))
 
     def forces(self, slots: FloatArray, pose: FloatArray, q: FloatArray) -> FloatArray:
-        """What pulls at each number that yields, N or N mm, (N, s), at poses (N, 6)."""
+        """Return forces on each elastic number, N or N mm, (N, s), at poses (N, 6)."""
         inside = self.under_load(slots, pose, q)
         return self._forces(slots, pose, q, inside, self.numbers(slots), self.carried)
 
@@ -182,7 +182,7 @@ class RestingMachine(CoreMachine):
     def _on_limbs(
         self, pose: FloatArray, q: FloatArray, inside: FloatArray, numbers: FloatArray
     ) -> FloatArray:
-        """What weights on limbs do on their own numbers, (N, s), the platform held."""
+        """Return forces of weights on limbs on their own numbers, (N, s), the platform held."""
         assert isinstance(self.inner, Machine | DrivenMachine)
         limbs = inside.shape[-2]
         weights = np.broadcast_to(self.pulls.at_anchors(numbers, limbs), (len(pose), limbs, 3))
@@ -234,7 +234,7 @@ class RestingMachine(CoreMachine):
         return at, self.numbers(mine), at.carried, mine
 
     def of_rows(self: R, rows: IntArray) -> R:
-        """The same with the state that it has in some rows of a call."""
+        """Return the machine with its state in some rows of a call."""
         inner, carried = self.inner.of_rows(rows), self.carried
         if carried is not None and carried.ndim == 2:
             carried = carried[rows]
@@ -245,11 +245,11 @@ class RestingMachine(CoreMachine):
         )
 
     def _settled(self, fresh: FloatArray, before: FloatArray) -> BoolArray:
-        """Where numbers stay, (N,)."""
+        """Mark rows where numbers stay, (N,)."""
         return np.asarray((np.abs(fresh - before) <= SETTLED * self._scale).all(axis=1))
 
     def _too_far(self, given: FloatArray) -> BoolArray:
-        """Where numbers give more than what is a deformation, (N,)."""
+        """Mark rows whose numbers give more than a deformation can, (N,)."""
         return np.asarray(~(np.abs(given) <= self._most).all(axis=1))
 
     def given_by_numbers(
@@ -260,7 +260,7 @@ class RestingMachine(CoreMachine):
         inside: FloatArray,
         places: IntArray,
     ) -> FloatArray:
-        """How far numbers give more, (N, s, k), by numbers of `Elastic` at places (k,)."""
+        """Differentiate deflections (N, s, k) by numbers of `Elastic` at places (k,)."""
         numbers = self.numbers(slots)
         force = self._forces(slots, pose, q, inside, numbers, self.carried)
         compliance = self.compliances(slots, q)

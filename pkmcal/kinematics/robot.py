@@ -75,7 +75,7 @@ class Robot(Kinematics, Result):
         return self.model.actuator_units
 
     def __copy__(self) -> Robot:
-        """The same machine, without what was computed of it: nothing is built anew."""
+        """Copy the machine without what was computed of it: nothing is built anew."""
         other = object.__new__(type(self))
         other.__dict__.update((k, v) for k, v in vars(self).items() if k not in _COMPUTED)
         return other
@@ -117,7 +117,7 @@ class Robot(Kinematics, Result):
         return self._completed(rows, match).pose.reshape(*shape, 6)
 
     def violation(self, pose: ArrayLike) -> FloatArray:
-        """How far a pose is from one the machine can take.
+        """Return how far a pose is from one the machine can take.
 
         Parameters
         ----------
@@ -144,7 +144,7 @@ class Robot(Kinematics, Result):
         return np.asarray(worst).reshape(shape)
 
     def feasible(self, pose: ArrayLike, actuators: ArrayLike | None = None) -> Feasibility:
-        """Which limits of which limbs a pose keeps.
+        """Check the limits of each limb at poses.
 
         Parameters
         ----------
@@ -339,7 +339,7 @@ class Robot(Kinematics, Result):
         return errors.reshape(*shape, 6, len(self.geometry))
 
     def actuator_twists(self, pose: ArrayLike, actuators: ArrayLike) -> FloatArray:
-        """How the platform turns and moves by each actuator coordinate.
+        """Return the platform's twist by each actuator coordinate.
 
         Parameters
         ----------
@@ -390,7 +390,7 @@ class Robot(Kinematics, Result):
         return q
 
     def _through_ties(self, errors: FloatArray) -> FloatArray:
-        """The same (N, 6, p) with the columns of named parameters after those of the numbers."""
+        """Append the columns of named parameters to those of the numbers, (N, 6, p)."""
         count = len(self.geometry) - errors.shape[2]
         if not count:
             return errors
@@ -505,7 +505,7 @@ class Robot(Kinematics, Result):
 
     @property
     def yields(self) -> bool:
-        """Whether something of it yields, so that it follows weights and what it carries."""
+        """True if a number of the machine yields to weights and loads."""
         return self.model.elastic is not None
 
     def yielding(self, compliance: Mapping[str, float], *, per_length: bool = False) -> Robot:
@@ -638,7 +638,7 @@ class Robot(Kinematics, Result):
 
     @property
     def closure_tolerance(self) -> float:
-        """What more closures than free coordinates may miss, mm; beyond it no pose is stated."""
+        """Largest miss of surplus closures, mm; beyond it no pose is stated."""
         return float(self.machine.struct.closure_tolerance)
 
     def closing(self, q: ArrayLike, guess: ArrayLike) -> Robot:
@@ -711,7 +711,7 @@ _COMPUTED = frozenset(
 
 
 def determines_others(robot: Robot) -> bool:
-    """Whether the limbs determine coordinates beside the commanded ones, which are not constant."""
+    """Whether the limbs determine other coordinates than the commanded ones, not constant."""
     constant = robot.model.match is None and robot.model.map in ("translation", "planar", "xy")
     return len(robot.moved) < len(POSE) and not constant
 

@@ -28,7 +28,7 @@ _WAYS = ("+x", "-x", "+y", "-y", "+z", "-z")
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Stiffness(Result):
-    """How a machine yields to what pulls at its tool, for poses of any leading shape.
+    """Stiffness of a machine at its tool, for poses of any leading shape.
 
     Of small forces beside those that act already: moments first, then forces, in the axes of the
     base. NaN where the machine has no such pose, is singular or gives way.
@@ -64,7 +64,7 @@ class Stiffness(Result):
         return out.reshape(self.compliance.shape)
 
     def along(self, direction: ArrayLike) -> FloatArray:
-        """How far the tool gives along a direction by a force along it, mm/N.
+        """Return how far the tool gives along a direction by a force along it, mm/N.
 
         Parameters
         ----------
@@ -95,7 +95,7 @@ class Stiffness(Result):
             return np.asarray(1.0 / np.maximum(self.along(direction), 0.0))
 
     def displacement(self, force: ArrayLike) -> FloatArray:
-        """How far a force at the tool, such as that of a cut, moves it: mm, (..., 3).
+        """Return how far a force at the tool, such as that of a cut, moves it: mm, (..., 3).
 
         Parameters
         ----------
@@ -163,7 +163,7 @@ def matrix_cells(matrix: FloatArray) -> list[list[str]]:
 def stiffness(
     robot: Robot, poses: ArrayLike, *, load: Load | None = None, at: ArrayLike = (0.0, 0.0, 0.0)
 ) -> Stiffness:
-    """How stiff a machine is at poses, by the compliances of its numbers.
+    """Compute stiffness at poses, by the compliances of the machine's numbers.
 
     Parameters
     ----------
@@ -317,7 +317,7 @@ def _yielding(robot: Robot) -> Robot:
 
 
 def _carried(robot: Robot, load: Load | None) -> Load:
-    """What a machine carries: the load, or the payload that its file states."""
+    """Return a machine's load: the one given, or the payload that its file states."""
     if load is None:
         return Load.stated(dict(robot.geometry.items()))
     load.rows(())

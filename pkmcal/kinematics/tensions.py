@@ -137,7 +137,7 @@ def tensions(
 
 
 def can_pull(robot: Robot, poses: FloatArray, load: CableLoad) -> BoolArray:
-    """At which poses (N, 6) all cables can pull at once: where `tensions` would be ok.
+    """Mark poses (N, 6) where all cables can pull at once: where `tensions` would be ok.
 
     Without tensions, which take some hundred times as long.
     """
@@ -186,7 +186,7 @@ class _Balance(NamedTuple):
 
     @property
     def reached(self) -> BoolArray:
-        """Which poses the machine can take (N,)."""
+        """Mask of poses the machine can take (N,)."""
         return np.asarray(np.isfinite(self.slopes).all(axis=(1, 2)))
 
 
@@ -205,7 +205,7 @@ def _balance(robot: Robot, poses: FloatArray, load: CableLoad) -> _Balance:
 
 
 def _held(balance: _Balance, cables: IntArray, least: float, most: float) -> BoolArray:
-    """At which poses (N,) forces balance the load, those of `cables` from `least` to `most`."""
+    """Mark poses (N,) where forces balance the load, cables' from `least` to `most`."""
     from scipy.optimize import nnls
 
     count = balance.slopes.shape[2]

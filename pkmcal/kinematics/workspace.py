@@ -1,4 +1,4 @@
-"""Where a machine can go: grids of poses, how far each coordinate goes, random poses."""
+"""Workspace of a machine: grids of poses, extent of each coordinate, random poses."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class Workspace(Result):
 
     @property
     def inside(self) -> BoolArray:
-        """Which poses keep all limits, on home's side of all singularities; where cables pull."""
+        """Mask of poses within all limits, on home's side of singularities; where cables pull."""
         return _inside(self.robot, self.feasibility, self.dexterity) & self.pulled
 
     @property
@@ -204,7 +204,7 @@ def sample_poses(robot: Robot, count: int = 30, seed: int = 0, *, share: float =
 
 
 def reach(robot: Robot) -> dict[str, tuple[float, float]]:
-    """How far each coordinate alone goes from home, mm and rad.
+    """Return how far each coordinate alone goes from home, mm and rad.
 
     Where the stated workspace leaves out home, from its middle.
 
@@ -296,7 +296,7 @@ def _inside(robot: Robot, feasible: Feasibility, dexterity_there: Dexterity) -> 
 
 
 def good_poses(robot: Robot, poses: FloatArray) -> BoolArray:
-    """Which poses (N, 6) keep all limits, on home's side of all singularities and not near one.
+    """Mark poses (N, 6) within all limits, on home's side of singularities, not near one.
 
     Of machines on cables those at which no cable would have to push.
     """

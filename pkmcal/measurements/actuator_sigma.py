@@ -1,4 +1,4 @@
-"""How well actuators were read."""
+"""Standard deviations of the actuator readings."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ class ActuatorSigma(Field):
         return whole
 
     def names(self, actuators: Collection[str], components: Collection[str]) -> set[str]:
-        """One for all actuators, or one for each."""
+        """Return the names of the columns: one for all actuators, or one for each."""
         return {self.name, *(f"{self.name}.{q}" for q in actuators)}
 
     def read(self, table: Table, instrument: Reading, units: Sequence[str]) -> FloatArray | None:
-        """In the unit of each actuator, or in steps where its readings are."""
+        """Read deviations in the unit of each actuator, or in steps where its readings are."""
         names = columns_of_actuators(table, self.name, len(units))
         if not names:
             return None
@@ -52,12 +52,12 @@ class ActuatorSigma(Field):
         return np.broadcast_to(np.stack(columns, axis=1), (len(table), len(units)))
 
     def columns(self, m: Any, units: Sequence[str]) -> Iterator[WrittenColumn]:
-        """One where all have the same, else one for each actuator."""
+        """Write one column where all actuators have the same, else one for each."""
         if m.actuator_sigma is not None:
             yield from one_or_each(self.name, units, m.actuator_sigma)
 
     def said(self, m: Any) -> str:
-        """That it is stated."""
+        """Say that the actuators' deviation is stated."""
         return "" if m.actuator_sigma is None else "actuator_sigma stated"
 
 

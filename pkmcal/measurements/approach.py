@@ -1,4 +1,4 @@
-"""From where each actuator came to its reading, for drives with backlash."""
+"""Approach of each actuator to its reading, for drives with backlash."""
 
 from __future__ import annotations
 
@@ -34,25 +34,25 @@ class Approach(Field):
         return rows.signs("approach", given, m.actuators.shape)
 
     def names(self, actuators: Collection[str], components: Collection[str]) -> set[str]:
-        """One for all actuators, or one for each."""
+        """Return the names of the columns: one for all actuators, or one for each."""
         return {self.name, *(f"{self.name}.{q}" for q in actuators)}
 
     def read(self, table: Table, instrument: Reading, units: Sequence[str]) -> FloatArray | None:
-        """Whole numbers (rows, n)."""
+        """Read whole numbers (rows, n)."""
         return read_of_actuators(table, self.name, len(units), table.integers)
 
     def columns(self, m: Any, units: Sequence[str]) -> Iterator[WrittenColumn]:
-        """One for each actuator."""
+        """Write a column for each actuator."""
         if m.approach is not None:
             yield from numbered(self.name, "", m.approach.astype(np.int64))
 
     def said(self, m: Any) -> str:
-        """That it is stated."""
+        """Say that the approach is stated."""
         return "" if m.approach is None else "approach stated"
 
 
 def _in_order(way: FloatArray) -> FloatArray:
-    """From where each actuator came to each place (P, n), one after the other."""
+    """Return the approach of each actuator to places (P, n) that follow one another."""
     moved: FloatArray = np.sign(np.diff(way, axis=0, prepend=way[:1]))
     for row, before in zip(moved[1:], moved[:-1], strict=True):
         row[row == 0.0] = before[row == 0.0]  # it stood still since

@@ -1,4 +1,4 @@
-"""What the platform carried, and what pulled at the tool, row by row."""
+"""The load on the platform and the force on the tool, row by row."""
 
 from __future__ import annotations
 

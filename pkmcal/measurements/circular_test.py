@@ -20,7 +20,7 @@ _FULL = np.pi / 6  # largest gap of a full circle that is sampled
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CircularTest(Result):
-    """How round paths are that were to be circles; mm.
+    """Circular test: roundness of paths that were to be circles; mm.
 
     Attributes
     ----------

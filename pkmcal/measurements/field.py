@@ -8,7 +8,9 @@ them, in their order there.
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Collection, Iterator, Sequence
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -37,12 +39,15 @@ class Field:
     unit : str or None
         Of its one column, where it has no methods for columns of its own; "": numbers without unit,
         None: names.
+    blank : bool
+        Whether cells of its one column may be empty: NaN then.
     """
 
     name = ""
     logged = False
     log_first = False
     unit: str | None = ""
+    blank = False
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
@@ -80,38 +85,62 @@ class Field:
         return {self.name}
 
     def read(self, table: Table, instrument: Reading, units: Sequence[str]) -> Any:
-        """What a table states; None where it states nothing. `units` are those of the actuators.
+        """Read the field of a table; None where it states nothing. `units` are the actuators'.
 
-        By default its one column: numbers, NaN where a cell is empty, or names.
+        By default its one column, of numbers or names.
         """
         if self.name not in table.columns:
             return None
         if self.unit is None:
             return np.array(table.texts(self.name))
-        return table.numbers(self.name, self.unit or "1", blank=True)[0]
+        return table.numbers(self.name, self.unit or "1", blank=self.blank)[0]
 
     def columns(self, m: Any, units: Sequence[str]) -> Iterator[WrittenColumn]:
-        """Its columns in a file; by default one of the entries (N,), none where it is None."""
+        """Write the field's columns; by default one of the entries (N,), none where it is None."""
         if self.of(m) is not None:
             yield WrittenColumn(self.name, self.unit or "", self.of(m))
 
     def framed(self, m: Any) -> Iterator[WrittenColumn]:
-        """Its columns in a data frame."""
+        """Return the field's columns in a data frame."""
         return self.columns(m, m.actuator_units or ("mm",) * m.actuators.shape[1])
 
     def printed(self, m: Any) -> Iterator[WrittenColumn]:
-        """Its columns in the printed table."""
+        """Return the field's columns in the printed table."""
         return iter(())
 
     def said(self, m: Any) -> str:
-        """What the title of the printed table says of it, or nothing."""
+        """Return the field's words in the title of the printed table, or nothing."""
         return ""
 
 
-def row_fields(measurements: type) -> tuple[Field, ...]:
+Fields = tuple[Field, ...]
+
+
+def row_fields(measurements: type) -> Fields:
     """The fields that a class of measurements has, in the order of its attributes."""
     every = (each.default for each in dataclasses.fields(measurements))
     return tuple(each for each in every if isinstance(each, Field))
+
+
+@cache
+def require_other_columns(
+    reading: str, columns: tuple[tuple[str, str], ...], labels: tuple[str, ...], fields: Fields
+) -> None:
+    """Refuse a class of readings with a component or a label that is a column of other things.
+
+    Raises
+    ------
+    ValueError
+        Its name: that of a field of the rows, of an actuator or of a column of the table.
+    """
+    components = [name for name, _ in columns]
+    taken = {"row", *(name for each in fields for name in each.names((), components))}
+    for name in (*components, *labels):
+        if name in taken or re.fullmatch(r"q\d+", name):
+            raise ArgumentError(
+                f"kind: {reading} calls a column {name!r}, which measurements have for"
+                " something else; give it another name"
+            )
 
 
 def declared(field: Field) -> Any:
@@ -119,9 +148,12 @@ def declared(field: Field) -> Any:
     return field
 
 
-def row_numbers(name: str, given: ArrayLike, rows: int) -> FloatArray:
-    """A copy as finite doubles, one per row; of one row the number alone will do."""
-    array = numbers(name, given)
+def row_numbers(name: str, given: ArrayLike, rows: int, blank: bool = False) -> FloatArray:
+    """A copy as finite doubles, one per row; of one row the number alone will do.
+
+    `blank`: NaN is a number that is not there.
+    """
+    array = numbers(name, given, blank)
     array = array[None] if rows == 1 and array.ndim == 0 else array
     if array.shape != (rows,):
         raise ArgumentError(f"{name} must have shape ({rows},); found {array.shape}")
@@ -149,7 +181,7 @@ def one_or_each(name: str, units: Sequence[str], values: FloatArray) -> Iterator
 def values_array(
     given: ArrayLike | None, instrument: Reading, rows: tuple[int, ...], alone: bool
 ) -> FloatArray:
-    """What was read, (N, k) or (N,); NaN where nothing was, of orientations as a whole."""
+    """Return readings, (N, k) or (N,); NaN where nothing was read, of orientations as a whole."""
     kind, k = instrument.name, len(instrument.components)
     if given is None:
         if k:
@@ -184,7 +216,7 @@ def values_array(
 
 
 def units_of_actuators(given: str | Sequence[str] | None, count: int) -> tuple[str, ...] | None:
-    """One unit per actuator, "mm" or "rad"; None where none is given."""
+    """Return a unit per actuator, "mm" or "rad"; None where none is given."""
     if given is None:
         return None
     units = words("actuator_units", given)

@@ -24,7 +24,7 @@ _PAIRED = 300  # poses between which distances are taken, at most
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Performance(Result):
-    """How well a machine goes where it is sent; mm, one entry for each of G poses.
+    """Performance of a machine at its commanded poses; mm, one entry for each of G poses.
 
     Attributes
     ----------

@@ -30,7 +30,7 @@ Rows = list[int | None]  # of the log, for each row of the instrument
 
 
 def way_and_shift(given: object) -> tuple[Join, int]:
-    """How to join, and by how many rows the log is late: of "row+1" by one.
+    """Return the way of joining, and the rows by which the log is late: of "row+1" one.
 
     Raises
     ------
@@ -230,7 +230,7 @@ def _by_time(table: Table, log: Table) -> tuple[Rows, str] | str:
 
 
 def _moving(log: Table, rows: IntArray) -> int:
-    """How many rows of a sampled log the next one differs from; 0 of a log of single poses."""
+    """Count rows of a sampled log that differ from the next; 0 of a log of single poses."""
     used = np.unique(rows)
     if len(log) < 2 * len(used):
         return 0
@@ -240,7 +240,7 @@ def _moving(log: Table, rows: IntArray) -> int:
 
 
 def _relative(table: Table) -> bool:
-    """Whether time-stamps are small numbers, as of seconds since a start."""
+    """Return whether time-stamps are small numbers, as of seconds since a start."""
     found = times_in(table)
     if isinstance(found, str):
         return False

@@ -30,7 +30,7 @@ def table(m: Any) -> Table:
 
 
 def title(m: Any) -> str:
-    """How many of what they are, and what is known of them."""
+    """Return the title of the printed table: number and kind of rows, stated fields."""
     n = m.actuators.shape[1]
     said = (field.said(m) for field in row_fields(type(m)))
     return ", ".join([m.instrument.title(m), f"{n} actuator{'' if n == 1 else 's'}",

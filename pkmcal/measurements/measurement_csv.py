@@ -361,8 +361,13 @@ def _known(
 
 
 def _reading(table: Table, several: tuple[str, ...], readings: Sequence[Reading]) -> Reading:
-    """What was measured, by the columns that are there."""
-    found: dict[str, Reading] = {title: each for each in readings for title in each.found_in(table)}
+    """Read the measured quantity, by the columns that are there."""
+    found: dict[str, Reading] = {}
+    for each in readings:
+        for title in each.found_in(table):
+            if title in found and each in KINDS.values():  # one that the caller states comes first
+                raise table.header_error(f"{title}: {found[title].noun()} or {each.noun()}?")
+            found[title] = each
     if several:
         found[f"several targets ({', '.join(several)})"] = Position()
     if len(found) > 1:
@@ -376,7 +381,7 @@ def _read_values(
     rotation: str | None,
     nominal: Callable[[], FloatArray | None],
 ) -> FloatArray | None:
-    """What was measured, (N, k) or (N,); None without columns of it."""
+    """Read the values, (N, k) or (N,); None without their columns."""
     form = orientation_in(table.columns)
     own = form == ANGLES and rotation in (None, OWN_ORDER)
     if read.turning is not None and form and not own:

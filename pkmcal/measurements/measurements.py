@@ -1,4 +1,4 @@
-"""What was measured on a machine: actuator readings and, beside them, poses, points or lengths."""
+"""Measurements of a machine: actuator readings and, beside them, poses, points or lengths."""
 
 from __future__ import annotations
 
@@ -20,7 +20,13 @@ from pkmcal.kinematics.drive_state import DriveState
 from pkmcal.measurements.actuator_sigma import ActuatorSigma
 from pkmcal.measurements.approach import Approach
 from pkmcal.measurements.carried_load import CarriedLoad
-from pkmcal.measurements.field import declared, row_fields, units_of_actuators, values_array
+from pkmcal.measurements.field import (
+    declared,
+    require_other_columns,
+    row_fields,
+    units_of_actuators,
+    values_array,
+)
 from pkmcal.measurements.former import OF_MEASUREMENTS, adapted
 from pkmcal.measurements.listing import table, title
 from pkmcal.measurements.measurement_writer import write_measurements
@@ -192,6 +198,9 @@ class Measurements(Result):
         instrument = adapted(
             "Measurements", stated(kind, instrument), fields, OF_MEASUREMENTS, present
         )
+        require_other_columns(
+            type(instrument).__name__, instrument.components, instrument.labels, of_rows
+        )
         q = numbers("actuators", actuators)
         if q.ndim not in (1, 2) or 0 in q.shape:
             raise ArgumentError(
@@ -266,7 +275,7 @@ class Measurements(Result):
         return np.array(np.broadcast_to(place, (len(self), 3)), order="C")
 
     def __getattr__(self, name: str) -> Any:
-        """Of the instrument: `run`, `touched`, `attachment` …; None where it has none."""
+        """Return an attribute of the instrument: `run`, `touched`, …; None where it has none."""
         if name in OF_MEASUREMENTS and "instrument" in vars(self):
             none = () if name == "touch_distances" else None
             return getattr(self.instrument, OF_MEASUREMENTS[name], none)
@@ -274,7 +283,7 @@ class Measurements(Result):
 
     @property
     def pose_index(self) -> Int64Array:
-        """Which pose each row belongs to, (N,), counted from 0.
+        """Pose of each row, (N,), counted from 0.
 
         Rows of one `group` are of one pose, and rows at the same actuators.
         """
@@ -282,7 +291,7 @@ class Measurements(Result):
 
     @property
     def drive_state(self) -> DriveState:
-        """From where actuators came, tensions as far as they were read, and what was carried."""
+        """Return actuators' approaches, tensions as far as they were read, and the load."""
         tension = None if self.tension is None else filled_tension(self.tension)
         return DriveState(self.approach, tension, self.load)
 

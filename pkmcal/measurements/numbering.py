@@ -18,15 +18,15 @@ class Group(Field):
     """Rows with the same number are repeats of one pose."""
 
     def kept(self, given: Any, m: Any) -> Int64Array:
-        """Whole numbers (N,)."""
+        """Check whole numbers (N,)."""
         return integers(self.name, given, len(m))
 
     def read(self, table: Table, instrument: Reading, units: Sequence[str]) -> Int64Array | None:
-        """Whole numbers."""
+        """Read whole numbers."""
         return table.integers(self.name) if self.name in table.columns else None
 
     def printed(self, m: Any) -> Iterator[WrittenColumn]:
-        """Its column."""
+        """Return the column of the printed table."""
         return self.framed(m)
 
 
@@ -34,17 +34,17 @@ class Lines(Field):
     """The line of each row in the file it was read from; no column states it."""
 
     def kept(self, given: Any, m: Any) -> Int64Array:
-        """Whole numbers (N,)."""
+        """Check whole numbers (N,)."""
         return integers(self.name, given, len(m))
 
     def names(self, actuators: Collection[str], components: Collection[str]) -> set[str]:
-        """None."""
+        """Return no names: the column is read elsewhere."""
         return set()
 
     def read(self, table: Table, instrument: Reading, units: Sequence[str]) -> Int64Array:
-        """Where each row stands."""
+        """Read the place of each row in its file."""
         return np.array(table.lines, dtype=np.int64)
 
     def columns(self, m: Any, units: Sequence[str]) -> Iterator[WrittenColumn]:
-        """None."""
+        """Return no names: the column is read elsewhere."""
         return iter(())

@@ -79,7 +79,7 @@ def _numbers(table: Table, names: Sequence[str]) -> FloatArray:
 
 
 def _forms(names: Sequence[str], given: FloatArray) -> dict[str, Rotation]:
-    """What the numbers may mean, by the word for it."""
+    """Return possible meanings of the numbers, by name."""
     if names == QUATERNION:  # the headings say which is which
         return {"wxyz": Rotation.from_quat(given[:, [1, 2, 3, 0]])}
     if names == NUMBERED:
@@ -181,7 +181,7 @@ def _refuse_wrong(
 
 
 def misfit(turns: Rotation, nominal: FloatArray) -> float:
-    """How far orientations are from those of the machine, rad rms, up to a frame and a tool.
+    """Return the misfit of orientations to the machine's, rad rms, up to a frame and a tool.
 
     M = F R T for every pose leaves, between two poses, rotation vectors that F alone turns.
     """

@@ -66,7 +66,7 @@ def _still(robot: Robot) -> list[str]:
 
 
 def _differs(table: Table, name: str) -> bool:
-    """Whether a column has numbers that are not all the same; of one row it is not known."""
+    """Return whether a column has numbers that are not all the same; of one row it is not known."""
     values = table.numbers(name, "mm", blank=True)[0]
     known = values[np.isfinite(values)]
     return len(known) < 2 or bool(np.ptp(known) > 0.0)

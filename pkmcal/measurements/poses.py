@@ -1,4 +1,4 @@
-"""Which rows are of one pose."""
+"""Rows of the same pose."""
 
 from __future__ import annotations
 

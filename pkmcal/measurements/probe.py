@@ -121,25 +121,25 @@ def actuators_at(robot: Robot, points: FloatArray) -> FloatArray:
 
 
 def apart_from(robot: Robot, actuators: FloatArray, z: FloatArray) -> FloatArray:
-    """How far (N,) the z that a firmware reported is from what the robot file gives, mm."""
+    """Return the reported z less the robot file's, mm (N,)."""
     off: FloatArray = np.abs(robot.forward(actuators).pose[:, 2] - z)
     return off
 
 
 def is_of_trigger(robot: Robot, actuators: FloatArray, z: FloatArray) -> bool:
-    """Whether actuators are those at which the firmware reported this z."""
+    """Return whether actuators are those at which the firmware reported this z."""
     return bool((apart_from(robot, actuators, z) < _SAME).all())
 
 
 def is_of_a_flat(robot: Robot, measured: Measurements) -> bool:
-    """Whether heights of a bed were measured where the robot file has one and the same z."""
+    """Return whether heights of a bed were measured where the robot file has one and the same z."""
     nominal = robot.forward(measured.actuators).pose[:, 2]
     small = float(np.ptp(measured.values)) < _FLAT * robot.length
     return small and len(measured) > 2 and bool(np.ptp(nominal) < _LEVEL)
 
 
 def agreement(robot: Robot, measured: Measurements, place: str) -> str:
-    """What it means that heights of a bed are those that the robot file gives; "" where not.
+    """Describe why heights of a bed are those of the robot file; "" where they are not.
 
     To rounding they are the file's own, and that is warned of. Within what a probe repeats to
     they may as well be those that the file was calibrated with.

@@ -1,4 +1,4 @@
-"""Which rows repeat another."""
+"""Repeated rows."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pkmcal.statistics.linear_fit import numbered
 
 
 def targets(measured: Measurements) -> IntArray:
-    """Which target each row is of, (N,), counted from 0: by its index, or by its place.
+    """Return the target of each row, (N,), counted from 0: by its index, or by its place.
 
     Rows of one target that differ in what else was read, a second place or an attachment, have
     numbers of their own.
@@ -28,6 +28,6 @@ def targets(measured: Measurements) -> IntArray:
 
 
 def groups(measured: Measurements) -> IntArray:
-    """Which pose and target each row measured, (N,), counted from 0."""
+    """Return the group of pose and target of each row, (N,), counted from 0."""
     keys = np.column_stack([measured.pose_index, targets(measured)])
     return np.unique(keys, axis=0, return_inverse=True)[1].reshape(-1)

@@ -18,13 +18,13 @@ from pkmcal.readings.rows import is_name
 
 
 class Session(Field):
-    """When the rows were measured."""
+    """Session in which the rows were measured."""
 
     logged = True
     unit = None
 
     def kept(self, given: Any, m: Any) -> TextArray:
-        """One name per row, given for all or for each."""
+        """Check session names, given for all rows or for each."""
         named = given.tolist() if isinstance(given, np.ndarray) else given
         names = words("session", named)
         if isinstance(named, str):
@@ -42,11 +42,11 @@ class Session(Field):
         return np.array(names)
 
     def printed(self, m: Any) -> Iterator[WrittenColumn]:
-        """Its column, where there are several sessions."""
+        """Return the column of sessions, where there are several."""
         return self.framed(m) if len(m.sessions) > 1 else iter(())
 
     def said(self, m: Any) -> str:
-        """Their names."""
+        """Say the names of the sessions."""
         if not m.sessions:
             return ""
         many = "s" if len(m.sessions) > 1 else ""

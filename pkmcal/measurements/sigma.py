@@ -1,4 +1,4 @@
-"""How good readings are: standard deviations or covariances of every row."""
+"""Standard deviations or covariances of the readings of every row."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class Sigma(Field):
         return np.array(np.broadcast_to(sigma, (rows, k)))
 
     def names(self, actuators: Collection[str], components: Collection[str]) -> set[str]:
-        """One for all components, one for each, or their covariances."""
+        """Return the names of the columns: one sigma for all, one a component, or covariances."""
         pairs = itertools.product(components, repeat=2)
         each = (f"{self.name}.{name}" for name in components)
         return {self.name, *each, *(f"cov.{a}.{b}" for a, b in pairs)}
@@ -110,7 +110,7 @@ class Sigma(Field):
         return np.stack(columns, axis=1)
 
     def columns(self, m: Any, units: Sequence[str]) -> Iterator[WrittenColumn]:
-        """One where all components have the same, else one for each; or the covariances."""
+        """Write one column where all components have the same, else one each; or covariances."""
         if (sigma := m.sigma) is None:
             return
         read = m.instrument.components
@@ -124,7 +124,7 @@ class Sigma(Field):
             yield from self._of_each(m)
 
     def framed(self, m: Any) -> Iterator[WrittenColumn]:
-        """One for each component."""
+        """Return a column for each component."""
         return iter(()) if m.sigma is None else self._of_each(m)
 
     def _of_each(self, m: Any) -> Iterator[WrittenColumn]:

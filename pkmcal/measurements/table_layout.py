@@ -42,7 +42,7 @@ ROTATIONS = (*QUATERNIONS, "rotvec")
 
 @dataclass(frozen=True)
 class Layout:
-    """What a file does not say about its columns.
+    """Layout of a file: what it does not say about its columns.
 
     Attributes
     ----------
@@ -269,7 +269,7 @@ def leave_out_unknown(table: Table, known: Collection[str], also: Collection[str
 
 
 def _agrees(table: Table, poses: Sequence[str], names: Sequence[str]) -> bool:
-    """Whether poses and actuators belong together, and names are of points rather than of targets.
+    """Return whether poses belong to actuators, and names are of points, not of targets.
 
     Home that is measured again has another pose's name; a log that runs on has several rows a pose.
     """

@@ -24,10 +24,10 @@ _OF_A_TARGET = re.compile(r"(?P<target>.+)\.[xyz]")
 
 
 class TargetIndex(Field):
-    """Which of several targets each row measured, counted from 0; its columns say where it is."""
+    """Which target each row measured, of several, counted from 0; its columns say its place."""
 
     def kept(self, given: Any, m: Any) -> Int64Array:
-        """Whole numbers (N,)."""
+        """Check whole numbers (N,)."""
         _refuse_without_point(m.instrument)
         index = integers(self.name, given, len(m))
         if index.min() < 0:
@@ -140,7 +140,7 @@ def read_several(
     fields: dict[str, Any],
     points_known: Collection[str],
 ) -> tuple[FloatArray, FloatArray, dict[str, Any]]:
-    """One measurement per row and target that was seen there, row by row."""
+    """Read a measurement per row and target that was seen there, row by row."""
     for name in table.columns:
         if name.partition(".")[0] in ("target", *points_known):
             raise table.header_error(f"column {name!r} does not go with '{targets[0]}.x'")
@@ -221,7 +221,7 @@ def _read_point(table: Table, name: str) -> FloatArray | None:
 
 
 def _one(places: FloatArray) -> FloatArray:
-    """One point (3,) where all rows have the same, to the last bit: 0.0 is not -0.0."""
+    """Reduce to one point (3,) where all rows have the same, to the last bit: 0.0 is not -0.0."""
     bits = places.view(np.int64)
     one: FloatArray = places[0] if (bits == bits[0]).all() else places
     return one

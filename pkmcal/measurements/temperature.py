@@ -26,7 +26,7 @@ class Temperature(Field):
     log_first = True
 
     def kept(self, given: Any, m: Any) -> FloatArray:
-        """Of all, of each row or of each part; NaN where it was not read."""
+        """Check temperatures of all, of each row or of each part; NaN where none was read."""
         found = numbers("temperature", given, blank=True)
         rows, parts = len(m), m.actuators.shape[1] + 2
         if found.shape not in ((), (rows,), (rows, parts)):
@@ -42,7 +42,7 @@ class Temperature(Field):
         return np.array(np.broadcast_to(of_rows, (rows, parts)))
 
     def names(self, actuators: Collection[str], components: Collection[str]) -> set[str]:
-        """One for the whole machine, or one for each part."""
+        """Return the names of the columns: one for the whole machine, or one for each part."""
         return {self.name, *(f"{self.name}.{part}" for part in ("base", "platform", *actuators))}
 
     def read(self, table: Table, instrument: Reading, units: Sequence[str]) -> FloatArray | None:
@@ -62,7 +62,7 @@ class Temperature(Field):
         return np.column_stack([read.get(name, whole) for name in parts]) if read else None
 
     def columns(self, m: Any, units: Sequence[str]) -> Iterator[WrittenColumn]:
-        """One if all parts have the same; none of a part that was never read."""
+        """Write one column if all parts have the same; none of a part that was never read."""
         if (given := m.temperature) is None:
             return
         same = np.array_equal(given, np.repeat(given[:, :1], given.shape[1], 1), True)

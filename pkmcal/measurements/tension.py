@@ -24,11 +24,11 @@ class Tension(Field):
     blank = True
 
     def kept(self, given: Any, m: Any) -> FloatArray:
-        """Of each actuator, given for all, for each or for each row."""
+        """Check tensions of each actuator, given for all, for each or for each row."""
         return of_actuators(self.name, given, m.actuators.shape, self.blank)
 
     def names(self, actuators: Collection[str], components: Collection[str]) -> set[str]:
-        """One for all actuators, or one for each."""
+        """Return the names of the columns: one for all actuators, or one for each."""
         return {self.name, *(f"{self.name}.{q}" for q in actuators)}
 
     def read(self, table: Table, instrument: Reading, units: Sequence[str]) -> FloatArray | None:
@@ -41,12 +41,12 @@ class Tension(Field):
         )
 
     def columns(self, m: Any, units: Sequence[str]) -> Iterator[WrittenColumn]:
-        """One for each actuator."""
+        """Write a column for each actuator."""
         if self.of(m) is not None:
             yield from numbered(self.name, "N", self.of(m))
 
     def said(self, m: Any) -> str:
-        """Whether it is exact."""
+        """Say whether tensions are exact."""
         if m.tension is None:
             return ""
         return "tension stated" if m.tension_sigma is None else "tension read"

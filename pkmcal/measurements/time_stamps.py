@@ -1,4 +1,4 @@
-"""When each row was measured, and time-stamps of instruments and controllers, in seconds."""
+"""Time of each row, and time-stamps of instruments and controllers, in seconds."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _WHOLE = re.compile(r"(:[0-9]{2}:[0-9]{2})(?![.,:0-9])")  # seconds without a fr
 
 
 class Time(Field):
-    """When each row was measured, in seconds from any start."""
+    """Time of each row, in seconds from any start."""
 
     def kept(self, given: Any, m: Any) -> FloatArray:
         """Seconds (N,)."""

@@ -71,7 +71,7 @@ class Assemblies(Result):
 
     @cached_property
     def feasible(self) -> BoolArray:
-        """Which modes keep the strokes and cones of the robot file (k,), when asked for."""
+        """Mask of modes that keep the strokes and cones of the robot file (k,), when asked for."""
         return self._feasible()
 
     def nearest(self, pose: ArrayLike) -> int:

@@ -34,7 +34,7 @@ PLANES = {"base_plane": "base", "hinge_plane": "hinge"}  # fixed in the base, ea
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Certificate(Result):
-    """What is proven about N approximate solutions.
+    """Certificate of N approximate solutions.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class Certificate(Result):
         yield f"{int(self.ok.sum())} of {self.ok.size} rows certified{worst}"
 
     def reshape(self, shape: tuple[int, ...]) -> Certificate:
-        """The same for a batch of this shape."""
+        """Return the certificate for a batch of this shape."""
         return Certificate(
             self.ok.reshape(shape), self.error.reshape(shape), self.unique.reshape(shape)
         )
@@ -98,7 +98,7 @@ class Closures:
         self.c, self.rho = spheres[..., 3:6], spheres[..., 6]
 
     def __call__(self, u: Array) -> tuple[Array, Array, FloatArray, FloatArray, FloatArray]:
-        """At u (N, 12).
+        """Evaluate the closures at u (N, 12).
 
         Returns F (N, 12), F' (N, 12, 12), what both are below if every term counts with its
         absolute value, and how fast each row of F' changes at most (12,).
@@ -162,7 +162,7 @@ class Closures:
         return np.concatenate([by_turn, left * (self.length * by_p)], axis=1)
 
     def _pose_rows(self, u: Array) -> list[tuple[Array, ...]]:
-        """What makes (R, p) a pose of the map, as F, F', their absolute terms and the change."""
+        """Return the rows that make (R, p) a pose of the map: F, F', absolute terms and change."""
         if self.map == "spatial":
             return _orthonormal(u)
         if self.map == "translation":
@@ -228,7 +228,7 @@ def newton(closures: Closures, u: Array, steps: int) -> Array:
 def kantorovich(
     f: Array, df: Array, f_abs: FloatArray, df_abs: FloatArray, change: FloatArray
 ) -> tuple[FloatArray, FloatArray, BoolArray]:
-    """How far solutions of N systems of k equations are at most, and are alone, and if there are.
+    """Bound the error of N solutions of k equations, and the ball in which each is alone.
 
     Parameters
     ----------
@@ -269,7 +269,7 @@ def certify(closures: Closures, u: Array) -> Certificate:
 
 
 def _inverses(matrices: Array) -> Array:
-    """Of each matrix its inverse; 0 where it has none, or not all of it is finite."""
+    """Invert each matrix; 0 where it has no inverse, or not all of it is finite."""
     out = np.zeros_like(matrices)
     good = np.isfinite(matrices).all(axis=(1, 2))
     good[good] = np.linalg.slogdet(matrices[good])[0] != 0  # otherwise a pivot is exactly 0

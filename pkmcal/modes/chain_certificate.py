@@ -69,7 +69,7 @@ def certify_chains(
 
 
 def most_modes(layout: ChainLayout) -> tuple[int, str] | None:
-    """How many isolated modes there are at most, and why; None where nothing is known.
+    """Bound the number of isolated modes, and say why; None where nothing is known.
 
     A chain with two passive joints that turn keeps the distance of a point of the platform from
     one of the base, or about a point the angle of two axes; with one, it leaves a turn.
@@ -229,7 +229,7 @@ class _Walk:
         ]
 
     def bend(self, length: float, ball: float) -> FloatArray:
-        """What the end's second derivatives by unit steps of all passive joints are below, (N,)."""
+        """Bound the end's second derivatives by unit steps of all passive joints, (N,)."""
         links = [*self.points, self.end]
         ways = [np.linalg.norm(b - a, axis=1) for a, b in pairwise(links)]
         reach = np.cumsum(ways[::-1], axis=0)[::-1] + self._slides * ball  # from joints to the end

@@ -59,7 +59,7 @@ class AssemblyProblem(NamedTuple):
 
     @property
     def provable(self) -> bool:
-        """Whether the closures are quadratic equations, as many as there are free coordinates."""
+        """True if the closures are quadratic equations, one for each free coordinate."""
         square = self.machine.rows == self.machine.m
         return square and isinstance(self.machine, Machine) and self.machine.fixed_spheres
 
@@ -224,7 +224,7 @@ def _of_chains(machine: ChainMachine, problem: AssemblyProblem, starts: int) -> 
 
 
 def _all_of_chains(machine: ChainMachine, proof: Certificate) -> tuple[bool, str]:
-    """Whether modes with these certificates are all, and why or why not."""
+    """Return whether modes with these certificates are all, and why or why not."""
     if machine.rows != machine.m:
         return False, "more closures than free coordinates"
     most = most_modes(machine.layout)

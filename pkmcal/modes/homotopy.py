@@ -50,7 +50,7 @@ class StartSystem:
 
 @dataclass(frozen=True, eq=False)
 class Endpoints:
-    """Where the paths ended.
+    """End points of the paths.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ class _Family:
 
 @cache
 def _families() -> tuple[_Family, ...]:
-    """All start systems, those with the fewest paths first."""
+    """Return start systems, those with the fewest paths first."""
     text = (files("pkmcal.modes") / "modes.json").read_text(encoding="utf-8")
     found = []
     for name, family in json.loads(text).items():
@@ -144,7 +144,7 @@ def endpoints(machine: Machine, start: StartSystem, map: str, spheres: FloatArra
 
 
 def _same_solutions(one: ComplexArray, other: ComplexArray) -> bool:
-    """Whether two sets of frames hold the same solutions of a middling size or less."""
+    """Return whether two sets of frames hold the same solutions of a middling size or less."""
     one, other = (each[np.abs(each).max(axis=1) < MIDDLING] for each in (one, other))
     return len(one) == len(other) == len(distinct(np.concatenate([one, other])))
 

@@ -22,7 +22,7 @@ def cross_matrix(vector: FloatArray) -> FloatArray:
 def straight(
     start: FloatArray, end: FloatArray, s: tuple[FloatArray, FloatArray, FloatArray]
 ) -> FloatArray:
-    """On the way between two poses: the origin on a line, the orientation about one axis (SLERP).
+    """Interpolate between two poses: origin on a line, orientation about one axis (SLERP).
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def straight(
 
 
 def written(pose: FloatArray, speed: FloatArray, bend: FloatArray) -> FloatArray:
-    """Of x y z α β γ (N, 6) that have speeds and accelerations; regular at β = ±90° too.
+    """Return x y z α β γ (N, 6) with speeds and accelerations; regular at β = ±90° too.
 
     Returns
     -------

@@ -30,11 +30,11 @@ class Sample(Protocol):
 
     @property
     def actuators(self) -> FloatArray:
-        """Their coordinates (N, n)."""
+        """Return coordinates of the actuators at times, (N, n)."""
 
 
 class Sampled(Protocol):
-    """What is asked of a move; `Move` describes each."""
+    """The interface that events ask of a move; `Move` describes each member."""
 
     @property
     def robot(self) -> Robot:
@@ -42,11 +42,11 @@ class Sampled(Protocol):
 
     @property
     def start(self) -> FloatArray:
-        """Its first pose (6,)."""
+        """First pose (6,) of the move."""
 
     @property
     def duration(self) -> float:
-        """How long it takes, s."""
+        """Duration, s."""
 
     def sample(self, t: FloatArray) -> Sample:
         """The machine at times (N,)."""
@@ -123,7 +123,7 @@ def _names(move: Sampled) -> list[tuple[str, int | None]]:
 
 
 def _margins(move: Sampled, times: FloatArray) -> FloatArray:
-    """How far inside each limit at times, (N, limits); below 0 where it is broken.
+    """Return the margin of each limit at times, (N, limits); below 0 where it is broken.
 
     Reach is left where a limb's actuator can no longer move it: where its transmission is 0.
     """
@@ -143,7 +143,7 @@ def _margins(move: Sampled, times: FloatArray) -> FloatArray:
 
 
 def _dips(move: Sampled, times: FloatArray) -> FloatArray:
-    """Where margins that may vanish between times (N,) are least."""
+    """Return times of least margin, of margins that may vanish between times (N,)."""
     margins = _margins(move, times)
     before, here, after = margins[:-2], margins[1:-1], margins[2:]
     with np.errstate(invalid="ignore"):  # limits not stated are infinitely far
@@ -160,7 +160,7 @@ def _dips(move: Sampled, times: FloatArray) -> FloatArray:
 
 
 def _turn(move: Sampled, low: float, high: float, column: int, before: bool) -> float:
-    """When a limit changes between two times."""
+    """Find the time between two at which a limit changes."""
     for _ in range(_HALVINGS):
         middle = (low + high) / 2
         if bool(_margins(move, np.array([middle]))[0, column] < 0) == before:

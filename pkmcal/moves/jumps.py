@@ -1,4 +1,4 @@
-"""Where speeds jump along a move: at the nodes of tables in drive laws."""
+"""Jumps of speed along a move: at the nodes of tables in drive laws."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def jumps(
 
 
 def said(found: Sequence[Jump]) -> str:
-    """That speeds jump, in one sentence."""
+    """Say that speeds jump, in one sentence."""
     first = ", ".join(f"q{jump.actuator} at {jump.time:.4f} s" for jump in found[:_LISTED])
     more = f" and {len(found) - _LISTED} more" if len(found) > _LISTED else ""
     return (

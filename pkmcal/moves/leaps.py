@@ -1,4 +1,4 @@
-"""Where the poses of a move change from one assembly mode to another, which no platform does."""
+"""Leaps of a move from one assembly mode to another, which no platform makes."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Sample(Protocol):
 
     @property
     def twist(self) -> FloatArray:
-        """Their twists (ω, v), (N, 6)."""
+        """Return the platform's twists (ω, v) at times, (N, 6)."""
 
 
 def apart(poses: FloatArray, others: FloatArray, length: float) -> FloatArray:
@@ -37,7 +37,7 @@ def apart(poses: FloatArray, others: FloatArray, length: float) -> FloatArray:
 
 
 def same(pose: FloatArray, other: FloatArray, length: float) -> bool:
-    """Whether two poses (6,) are of one assembly mode: one place, for the same actuators."""
+    """Return whether two poses (6,) are of one assembly mode: one place, for the same actuators."""
     return not float(apart(pose[None], other[None], length)[0]) > _SMALL * length
 
 

@@ -105,7 +105,7 @@ class Move(Result):
 
     @property
     def duration(self) -> float:
-        """How long it takes, s."""
+        """Duration, s."""
         return self.law.duration
 
     def sample(self, t: ArrayLike) -> MoveSample:
@@ -132,7 +132,7 @@ class Move(Result):
         return events(self)
 
     def conditioning(self, t: ArrayLike) -> FloatArray:
-        """How well the pose is held at times (...): 1 best, 0 at a singularity."""
+        """Return the conditioning of the pose at times (...): 1 best, 0 at a singularity."""
         return dexterity(self.robot, self.sample(t).pose).conditioning
 
     def _parts(self) -> Iterator[str | Table]:

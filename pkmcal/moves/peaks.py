@@ -1,4 +1,4 @@
-"""Where along a move something is largest, between the samples too.
+"""Extremes of a quantity along a move, between the samples too.
 
 Own code, since optimisers of one variable look for one extremum in a bracket, and here every peak
 of every actuator must be found before it can be bracketed. By the mean value theorem a speed
@@ -37,11 +37,11 @@ class Sample(Protocol):
 
     @property
     def velocities(self) -> FloatArray:
-        """Their speeds (N, n)."""
+        """Return speeds of the actuators, (N, n)."""
 
     @property
     def accelerations(self) -> FloatArray:
-        """Their accelerations (N, n)."""
+        """Return accelerations of the actuators, (N, n)."""
 
 
 def peaks(sample: Callable[[FloatArray], Sample], duration: float) -> tuple[FloatArray, FloatArray]:

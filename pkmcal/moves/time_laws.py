@@ -1,4 +1,4 @@
-"""How a move runs in time: cubic, quintic and jerk-limited laws, from rest to rest."""
+"""Time laws of a move: cubic, quintic and jerk-limited, from rest to rest."""
 
 from __future__ import annotations
 

@@ -146,7 +146,7 @@ class Design:
         return min(found, key=len)
 
     def exchanged_for(self, chosen: IntArray, member: int) -> FloatArray:
-        """What the criterion is with each candidate (N,) in place of a member.
+        """Return the criterion with each candidate (N,) in place of a member.
 
         Logarithm of a standard deviation, of the prediction or of the scaled parameters; infinite
         for the other members and for candidates of another sort.
@@ -167,7 +167,7 @@ class Design:
         return worth
 
     def _lacking(self, chosen: list[int]) -> FloatArray:
-        """What stands for the information that a choice lacks.
+        """Return a stand-in for the information that a choice lacks.
 
         Choices too small to identify everything differ in what they identify only if the rest is
         not unknown beyond all measure.
@@ -216,7 +216,7 @@ class Design:
         return np.sort(np.array(chosen, dtype=np.intp))
 
     def _settled(self, chosen: list[int], ridge: FloatArray) -> list[int]:
-        """The same of candidates on a shortlist."""
+        """Settle the gains of candidates on a shortlist."""
         short, exchanged = self._shortlist(chosen, ridge), True
         while exchanged:
             chosen, exchanged = self._exchange(chosen, ridge, short)
@@ -238,7 +238,7 @@ class Design:
     def _exchange(
         self, chosen: list[int], ridge: FloatArray, among: IntArray
     ) -> tuple[list[int], bool]:
-        """One member exchanged for the best among these candidates, if one wants to be."""
+        """Exchange one member for the best of these candidates, if that is an improvement."""
         for i in self._least(chosen, ridge):
             others = [j for j in chosen if j != i]
             if len(among) == len(self._all):
@@ -269,7 +269,7 @@ class Design:
         return information
 
     def _gains(self, chosen: list[int], ridge: FloatArray, among: IntArray) -> FloatArray:
-        """What each candidate among these would add to the chosen; nothing for themselves."""
+        """Return the gain of each of these candidates beside the chosen; 0 for the chosen."""
         at = np.sort(np.array(chosen, dtype=np.intp))
         every = len(among) == len(self._blocks)
         gains = self._changes(self._blocks if every else self._blocks[among], at, 1.0, ridge)
@@ -304,7 +304,7 @@ class Design:
         return gains
 
     def _bounds(self, chosen: IntArray, ridge: FloatArray) -> FloatArray:
-        """What the gain of no candidate (N,) exceeds.
+        """Bound the gain of every candidate (N,).
 
         With G = B C Bᵀ of a block, ln det(1 + G) ≤ k ln(1 + tr G / k), and what it takes off the
         cost, tr((1 + G)⁻¹ S), is at most tr S. Single precision is allowed for.
@@ -332,7 +332,7 @@ class Design:
     def _changes(
         self, blocks: FloatArray, chosen: IntArray, sign: float, ridge: FloatArray
     ) -> FloatArray:
-        """By how much the criterion changes if a block is added to the chosen ones, or removed."""
+        """Return the change of the criterion by adding a block to the chosen, or removing it."""
         covariance = np.asarray(np.linalg.inv(self._information(chosen) + ridge), np.float64)
         found = [
             self._change(blocks[some], covariance, sign) for some in lots(len(blocks), _TOGETHER)

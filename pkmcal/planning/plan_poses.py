@@ -1,4 +1,4 @@
-"""Which poses to measure, so that a calibration knows best where the machine goes."""
+"""Choice of poses to measure, so that a calibration knows best where the machine goes."""
 
 from __future__ import annotations
 
@@ -375,7 +375,7 @@ def _before(
 def _counts(
     kind: Planned | Mapping[Any, int], count: object, accuracy: object
 ) -> dict[Planned, int | None]:
-    """How many poses of each kind; None where an accuracy decides."""
+    """Return the number of poses of each kind; None where an accuracy decides."""
     if isinstance(kind, Mapping):
         if not kind or count is not None or accuracy is not None:
             raise ArgumentError(
@@ -408,7 +408,7 @@ def _weight(given: object, accuracy: object, criterion: Criterion) -> float:
 
 
 def _of(name: str, given: Any, kind: Planned, kinds: Sequence[Planned]) -> Any:
-    """What was given of one kind: one for all, or by kind."""
+    """Return the value given for one kind: one for all, or by kind."""
     if not isinstance(given, Mapping):
         return given
     for each in given:
@@ -422,7 +422,7 @@ def _of(name: str, given: Any, kind: Planned, kinds: Sequence[Planned]) -> Any:
 
 
 def _drives(robot: Calibratable, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """How far the drives are out (N, n), and at home, mm, angles as arcs; zero of an arm.
+    """Return the way of the drives (N, n), and at home, mm, angles as arcs; zero of an arm.
 
     Lengths and angles, whatever the actuators read: those may be steps or turns.
     """
@@ -510,7 +510,7 @@ def _within_limits(
 
 
 def _safe(chosen: Parameters, poses: FloatArray, q: FloatArray) -> BoolArray:
-    """Which candidates machines with errors reach, too: none beside a singularity."""
+    """Mark candidates that machines with errors reach, too: none beside a singularity."""
     k = len(chosen.places)
     sigma = np.minimum(chosen.prior, _ERROR * chosen.scale)[:k]
     random, values = np.random.default_rng(0), chosen.robot.geometry.values

@@ -1,4 +1,4 @@
-"""What poses to be measured would bring to a calibration, before anything is measured."""
+"""Information that planned poses would bring to a calibration."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def planned(
     actuator_noise: ArrayLike | None,
     load: Load | None = None,
 ) -> Measurements:
-    """What would be measured, the rows of a pose one after another; `several` are targets."""
+    """Make the planned measurements, rows of a pose one after another; `several` are targets."""
     if isinstance(robot, Robot) and robot.model.balanced_load is not None:
         raise ArgumentError(
             f"robot: plans know no load cells, and tensions of {robot.name} are to balance its load"
@@ -141,7 +141,7 @@ def read_at(robot: Calibratable, q: FloatArray, kinds: Sequence[Kind | Reading])
 
 
 def stated_loads(robot: Calibratable, payloads: Sequence[float | Load]) -> list[Load | None]:
-    """What the machine is to carry; `[None]` where that is what its file states.
+    """Return the loads to be carried; `[None]` where the file states them.
 
     Raises
     ------
@@ -200,7 +200,7 @@ def equations_of(
 
 
 def information(equations: Equations, poses: int) -> FloatArray:
-    """What each pose brings (N, k, n): derivatives of its equations, whitened and scaled."""
+    """Return the information of each pose (N, k, n): its derivatives, whitened and scaled."""
     equations, rows = _derivatives(equations)
     block_of_row = equations.blocks.block_of_row
     first = np.arange(0, len(block_of_row), len(block_of_row) // poses)
@@ -211,7 +211,7 @@ def information(equations: Equations, poses: int) -> FloatArray:
 
 
 def brought(equations: Sequence[Equations]) -> FloatArray:
-    """What all rows of some sets bring together (p, n), as `information` of poses has it."""
+    """Return the information of all rows of some sets (p, n), as `information` of poses has it."""
     rows = [_derivatives(each)[1] for each in equations]
     return np.asarray(np.linalg.qr(np.vstack(rows), mode="r"), dtype=np.float64)
 
@@ -297,7 +297,7 @@ def design_of(
 
 
 def _rigid_motions(points: FloatArray) -> FloatArray:
-    """How points (T, 3) move as one body, (3 T, 6): shifts, then turns about their middle."""
+    """Return rigid motions of points (T, 3), (3 T, 6): shifts, then turns about their middle."""
     away = (points - points.mean(axis=0))[:, None]
     turns = np.cross(np.eye(3)[None], away).transpose(0, 2, 1)
     shifts = np.broadcast_to(np.eye(3), turns.shape)

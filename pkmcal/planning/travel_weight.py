@@ -88,7 +88,7 @@ def _swept(
     weight: float,
     most: float,
 ) -> tuple[IntArray, float]:
-    """Each member once makes room for the best of all; what the sum is then."""
+    """Replace each member once by the best of all; return the sum."""
     cost = np.inf
     for member in path.tolist():
         k = int(np.flatnonzero(path == member)[0])

@@ -1,4 +1,4 @@
-"""Where an instrument stands: the frame in which what a machine predicts lies nearest to readings.
+"""Place of an instrument: the frame in which predictions lie nearest to readings.
 
 In closed form or nearly so, with the nominal machine: where the search for its errors starts.
 SciPy aligns one set of known points; here targets may be unknown, and 24 starts run at once.

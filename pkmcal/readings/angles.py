@@ -64,7 +64,7 @@ class Angle(Reading):
         return Predicted(values, by_twist, {"zero": np.full((len(m), 1, 1), -1.0)})
 
     def follows_pose(self, machine: Any) -> bool:
-        """Of a pulley's swivel it does; joints of a chain are where that closes."""
+        """Return True for a pulley's swivel; joints of a chain follow from its closure."""
         return joint_angles.follows_pose(machine, str(self.joint))
 
     def by_geometry(self, at: At, places: IntArray) -> FloatArray | None:
@@ -117,7 +117,7 @@ class Angle(Reading):
         return self, values
 
     def found_in(self, table: Table) -> list[str]:
-        """Each column ``angle:JOINT``."""
+        """Find the columns ``angle:JOINT``."""
         return [name for name in table.columns if _COLUMN.fullmatch(name)]
 
     def names(self, table: Table) -> set[str]:

@@ -1,4 +1,4 @@
-"""Where boards are before a camera, from the pixels of their corners alone.
+"""Boards before a camera: their places, from the pixels of the corners alone.
 
 A flat board that is small in its picture has two places at which its corners are seen nearly
 alike, mirrored at the plane across the line of sight. Which of them it is only several pictures
@@ -32,7 +32,7 @@ _FLAT = 1e-6  # share of a board's size by which its corners may stand off a pla
 
 @dataclass(frozen=True, eq=False)
 class BoardPoses:
-    """Of each of P pictures the places of the board, best first.
+    """Places of the board in each of P pictures, best first.
 
     Attributes
     ----------
@@ -133,7 +133,7 @@ def pictures_told(
 
 
 def mm_per_pixel(corner: FloatArray, pixel: FloatArray, picture: IntArray) -> FloatArray:
-    """What a pixel is at the board of each picture, mm, by the picture as if from far away (P,).
+    """Return the size of a pixel at the board of each picture, mm, as if from far away (P,).
 
     NaN where corners (N, 3) of a picture are in a line. `picture` (N,) counts from 0.
     """
@@ -197,7 +197,7 @@ def _projection(point: FloatArray, direction: FloatArray, picture: IntArray) -> 
 
 
 def _of_flat(plane: FloatArray, size: float) -> tuple[list[FloatArray], FloatArray]:
-    """Both turnings (P, 3, 3) of flat boards and their middle (P, 3), by how the middle is seen.
+    """Return both rotations (P, 3, 3) of flat boards and their middle (P, 3).
 
     The derivative of the projection at the middle of the board is that of an affine camera along
     the line of sight, which two turnings fulfil (T. Collins, A. Bartoli, Infinitesimal plane-based

@@ -177,7 +177,7 @@ class Camera(Reading):
 
     @property
     def frame_name(self) -> str:
-        """Of what stands."""
+        """The name of what stands."""
         return self.camera_name if self.on == "base" else self.board_name
 
     @property
@@ -212,7 +212,7 @@ class Camera(Reading):
         size: FloatArray = _NO_SIZE,
         **numbers: FloatArray,
     ) -> Shared:
-        """As `predict`, through the motion of each picture's board before the camera."""
+        """Return `predict` through the motion of each picture's board before the camera."""
         count = len(at.pose)
         frame = _NOWHERE if at.frame is None else at.frame
         pose, origin, within = (
@@ -253,7 +253,7 @@ class Camera(Reading):
         )
 
     def dependences(self, data: InFit) -> Iterator[Dependence]:
-        """What is mounted on the platform; the lens and the size of the board."""
+        """Return what is on the platform, the lens, and the size of the board."""
         m = data.measured
         count, every = len(m), np.zeros(len(m), dtype=np.intp)
         yield always("tool", "tool", PLACE, [self._carried_thing] * count, data.starts)
@@ -272,7 +272,7 @@ class Camera(Reading):
             yield Dependence("size", "size", np.zeros((count, 1)), sizes, every)
 
     def starts(self, machine: Any, sets: Sets, found: Starts) -> None:
-        """At the platform; `places_seen` puts it in its place together with the frame."""
+        """Start at the platform; `places_seen` finds the place together with the frame."""
         for data, _ in sets:
             thing = data.measured.instrument._carried_thing
             found["tool", thing] = Start(tuple(range(6)), np.zeros(6))
@@ -304,7 +304,7 @@ class Camera(Reading):
         return pictures_told(self._corners(len(m)), m.values, self._pictures(m))
 
     def arguments(self, m: Measured) -> dict[str, FloatArray]:
-        """What is mounted where, as a simulation was told."""
+        """Return the mountings, as a simulation was told."""
         return {"tool": as_rows("carried", self.carried, 6)[0][0]}
 
     def simulated(self, m: Measured, solve: Solve) -> FloatArray:
@@ -363,12 +363,12 @@ class Camera(Reading):
 
     @property
     def _carried(self) -> Literal["board", "camera"]:
-        """What of both is on the platform."""
+        """The one of camera and board that is on the platform."""
         return "board" if self.on == "base" else "camera"
 
     @property
     def _carried_thing(self) -> str:
-        """Its name among tools."""
+        """The name among tools of what is on the platform."""
         name = self.board_name if self._carried == "board" else self.camera_name
         return _dotted(self._carried, name)
 
@@ -385,7 +385,7 @@ class Camera(Reading):
         return numbers_of_lens(stem, self.lens_numbers(), slots, m.values, mm)
 
     def _pictures(self, m: Measured) -> IntArray:
-        """Which picture each row is of, (N,), counted from 0."""
+        """Return the picture of each row, (N,), counted from 0."""
         if m.group is not None:
             return np.unique(m.group, return_inverse=True)[1].reshape(-1)
         return np.unique(m.actuators, axis=0, return_inverse=True)[1].reshape(-1)

@@ -28,5 +28,5 @@ class Closure(Reading):
         return []
 
     def title(self, m: Measured) -> str:
-        """How many rows."""
+        """Return a title: how many rows there are."""
         return f"{len(m)} row{'' if len(m) == 1 else 's'} of actuators alone"

@@ -1,4 +1,4 @@
-"""What an instrument has for all rows, as a focal length: a column ``KIND.FIELD`` of a file each.
+"""Constants of an instrument, as a focal length: a column ``KIND.FIELD`` of a file each.
 
 Every field of its class that no other column holds: numbers and words are written and read back,
 anything else is refused, so that no file is read with another instrument than it was written with.
@@ -105,7 +105,7 @@ def _default(reading: Reading, name: str) -> Any:
 
 
 def _value(cell: str, like: Any) -> Any:
-    """What a cell says, of the type that the field has; of None a number, or else a word."""
+    """Return a cell as the field's type; for None a number, or else a word."""
     if isinstance(like, str):
         return cell
     if isinstance(like, bool):

@@ -28,7 +28,7 @@ _WAY = "to.approach"  # columns of files: from where actuators came to the secon
 
 @dataclass(frozen=True, eq=False)
 class Distance(Reading):
-    """From a fixed point of the base, the target of the rows, to a point of the platform.
+    """Distance from a fixed point of the base, the rows' target, to a point of the platform.
 
     Attributes
     ----------
@@ -60,12 +60,12 @@ class Distance(Reading):
         return distances(at.pose, target, anchor, zero)
 
     def dependences(self, data: InFit) -> Iterator[Dependence]:
-        """Both ends."""
+        """Return both ends of the distance."""
         yield point(data.measured, "target", "attachment", data.unknown_attachment)
         yield point(data.measured, "anchor", "anchor", data.unknown_target)
 
     def arguments(self, m: Measured) -> dict[str, FloatArray]:
-        """Both ends as stated."""
+        """Return both ends as stated."""
         return {"target": self._attachments(m), "anchor": m.targets}
 
     def _attachments(self, m: Measured) -> FloatArray:
@@ -97,7 +97,7 @@ class RelativeDistance(Distance):
     anew = "run"
 
     def dependences(self, data: InFit) -> Iterator[Dependence]:
-        """Both ends, and the zero of each run."""
+        """Return both ends, and the zero of each run."""
         yield from super().dependences(data)
         yield always("zero", "run", (("zero", "mm"),), np.asarray(self.run).tolist(), data.starts)
 
@@ -114,7 +114,7 @@ class RelativeDistance(Distance):
             found["run", name] = Start((0,), np.nan_to_num([_mean(np.concatenate(parts))]))
 
     def simulated(self, m: Measured, solve: Solve) -> FloatArray:
-        """From the first row of each run on."""
+        """Simulate distances from the first row of each run on."""
         exact = super().simulated(m, solve)
         _, first, of_row = np.unique(np.asarray(self.run), return_index=True, return_inverse=True)
         exact -= exact[first][of_row.reshape(-1)]
@@ -156,7 +156,7 @@ class Between(Reading):
     per_row = ("other", "approach")
 
     def follows_pose(self, machine: Any) -> bool:
-        """It follows from two."""
+        """Return False: a distance between places follows from two poses."""
         return False
 
     def predict(self, at: At, target: FloatArray = ORIGIN, **numbers: FloatArray) -> Predicted:
@@ -172,7 +172,7 @@ class Between(Reading):
         yield point(data.measured, "target", "target", data.unknown_target)
 
     def simulated(self, m: Measured, solve: Solve) -> FloatArray:
-        """At the poses of both rows of actuators."""
+        """Simulate distances between the poses of both rows of actuators."""
         there = At(solve(m.actuators, "q").pose, solve(np.asarray(self.other), "other").pose)
         return self.predict(there, target=m.targets).values
 

@@ -1,4 +1,4 @@
-"""Where a tool is on the platform, and the instrument's frame with it: where their search starts.
+"""Hand-eye start: a tool on the platform, and the instrument's frame with it.
 
 What was measured is M = F P T: the frame F, the platform's pose P, the tool T. The rotations follow
 from a singular value decomposition (M. Shah, Solving the robot-world/hand-eye calibration problem

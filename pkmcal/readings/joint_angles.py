@@ -25,7 +25,7 @@ _STEP = 1e-5  # of the machine's size
 
 
 def place_of(machine: Calibratable, joint: str) -> int:
-    """Which passive joint a name is.
+    """Return the passive joint of this name.
 
     Raises
     ------
@@ -41,7 +41,7 @@ def place_of(machine: Calibratable, joint: str) -> int:
 
 
 def follows_pose(machine: Calibratable, joint: str) -> bool:
-    """Whether the angle of a joint follows from the pose: of a pulley's swivel it does."""
+    """Return whether the angle of a joint follows from the pose: of a pulley's swivel it does."""
     return isinstance(machine, Robot) and machine.model.chains is None
 
 
@@ -89,7 +89,7 @@ def rates(
     places: IntArray,
     state: DriveState,
 ) -> FloatArray:
-    """How they follow numbers of the geometry at some places, (N, p), the actuators held."""
+    """Differentiate angles by numbers of the geometry at some places, (N, p), actuators held."""
     values, units = machine.geometry.values, machine.geometry.units
     by_unit = {"mm": _STEP * machine.length, "rad": _STEP}
     reach = max(1.0, float(np.abs(q).max()))

@@ -1,4 +1,4 @@
-"""What pixels of boards show to be wrong with a lens, or with the numbers of the corners."""
+"""Doubts about a lens, or about the numbers of the corners, from pixels of boards."""
 
 from __future__ import annotations
 
@@ -70,6 +70,6 @@ def lens_doubts(
 
 
 def _typical(found: BoardPoses) -> float:
-    """What corners of the median picture are off, px."""
+    """Return the misfit of corners in the median picture, px."""
     rms = found.rms[:, 0]
     return float(np.median(rms[np.isfinite(rms)])) if np.isfinite(rms).any() else float("inf")

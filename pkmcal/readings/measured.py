@@ -1,4 +1,4 @@
-"""What readings ask of the rows they are of: `Measurements` and the sets of a calibration."""
+"""The interface that readings ask of their rows: `Measurements`, sets of a calibration."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Measured(Protocol):
 
     @property
     def values(self) -> FloatArray:
-        """What was measured, (N, k) or (N,)."""
+        """Readings, (N, k) or (N,)."""
 
     @property
     def instrument(self) -> Any:
@@ -37,19 +37,19 @@ class Measured(Protocol):
 
     @property
     def target_index(self) -> Int64Array | None:
-        """Which of several targets each row measured."""
+        """Target of each row, of several."""
 
     @property
     def target_names(self) -> tuple[str, ...] | None:
-        """Their names."""
+        """Names of the targets."""
 
     @property
     def group(self) -> Int64Array | None:
-        """Which rows are repeats of one pose, or of one picture."""
+        """Group of rows that repeat one pose, or one picture."""
 
     @property
     def drive_state(self) -> DriveState:
-        """From where actuators came, and the tension of what they drive."""
+        """Return actuators' approaches, and tensions of what they drive."""
 
     def of_points(self, place: FloatArray | None) -> FloatArray:
         """A point of every row (N, 3), of one, one a row or one for each target."""
@@ -64,16 +64,16 @@ class InFit(Protocol):
 
     @property
     def unknown_frame(self) -> bool:
-        """Whether the instrument's frame is estimated."""
+        """True if the instrument's frame is estimated."""
 
     @property
     def unknown_target(self) -> bool:
-        """Whether targets are estimated."""
+        """True if targets are estimated."""
 
     @property
     def unknown_attachment(self) -> bool:
-        """Whether attachments are estimated."""
+        """True if attachments are estimated."""
 
     @property
     def starts(self) -> Mapping[tuple[str, str], Any]:
-        """Where the search starts for unknowns without a present value."""
+        """Start of the search for unknowns without a present value."""

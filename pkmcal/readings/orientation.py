@@ -46,7 +46,7 @@ def shortest(angles: FloatArray) -> FloatArray:
 
 
 def by_turning(vectors: FloatArray) -> FloatArray:
-    """How rotation vectors (N, 3) shrink as what is predicted turns, (N, 3, 3): near 0, one."""
+    """Return how rotation vectors (N, 3) shrink as the prediction turns, (N, 3, 3): near 0, one."""
     twists = np.hstack([-vectors, np.zeros_like(vectors)])
     rates: FloatArray = screws.exp_jacobian(twists, inverse=True).reshape(-1, 6, 6)[:, :3, :3]
     return rates

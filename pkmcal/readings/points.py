@@ -24,7 +24,7 @@ PLACE_TITLE = "x, y, z"
 
 @dataclass(frozen=True, eq=False)
 class Position(Reading):
-    """Where a point of the platform is."""
+    """Position of a point of the platform."""
 
     name = "position"
     components = POINT
@@ -57,7 +57,7 @@ class Position(Reading):
 
 @dataclass(frozen=True, eq=False)
 class Height(Position):
-    """How high a point of the platform is."""
+    """Height of a point of the platform."""
 
     name = "height"
     components = (("z", "mm"),)

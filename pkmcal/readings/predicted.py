@@ -1,4 +1,4 @@
-"""What readings of one kind are at a machine, with their derivatives."""
+"""Where a machine is when something is read, and what should be read there."""
 
 from __future__ import annotations
 
@@ -8,11 +8,47 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from pkmcal.arguments import kind
 from pkmcal.arrays import FloatArray, IntArray, chained
+from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.readings.measured import Measured
 
 NOWHERE = np.zeros(6)
 MOTION = 6  # numbers of the motion of a lot of rows: ω, then v
+
+
+@dataclass(frozen=True, eq=False)
+class At:
+    """Where a machine is when something is read.
+
+    Attributes
+    ----------
+    pose : ndarray (N, 6)
+        Of the platform in the base frame, mm and rad.
+    other : ndarray (N, 6) or None
+        At the second place.
+    frame, origin : ndarray (6,)
+        Pose of the base in the instrument's frame, counted from `origin`; None: they are one.
+    axis : ndarray of int (N,) or None
+        Of touched lines and planes, which axis of its own each row's has.
+    machines : callable or None
+        Gives pairs of a machine and its rows; for what the pose alone does not determine.
+    measured : Measurements or None
+        The rows.
+    """
+
+    pose: FloatArray
+    other: FloatArray | None = None
+    frame: FloatArray | None = None
+    origin: FloatArray = field(default_factory=lambda: NOWHERE)
+    axis: IntArray | None = None
+    machines: Callable[[], Iterator[tuple[Any, IntArray]]] | None = None
+    measured: Measured | None = None
+
+    def of_rows(self) -> tuple[Measured, Iterator[tuple[Any, IntArray]]]:
+        """The rows and their machines, for a reading that needs both."""
+        assert self.measured is not None and self.machines is not None
+        return self.measured, self.machines()
 
 
 @dataclass(frozen=True)
@@ -39,6 +75,25 @@ class Predicted:
     by: Mapping[str, FloatArray] = field(default_factory=dict)
     by_frame: FloatArray | None = None
     by_other: FloatArray | None = None
+
+
+def require_shape(what: str, found: object, shape: tuple[int, ...]) -> None:
+    """Refuse what a class of the user's own returned if it is no array of this shape."""
+    if not isinstance(found, np.ndarray) or found.shape != shape:
+        seen = found.shape if isinstance(found, np.ndarray) else kind(found)
+        raise ArgumentError(f"{what} must be an array of shape {shape}; found {seen}")
+
+
+def require_predicted(name: str, components: int, rows: int, found: object) -> None:
+    """Refuse what `predict` of a kind returned without values (N, k) or derivatives (N, k, 6)."""
+    what = f"kind: predict of {name!r}"
+    if not isinstance(found, Predicted):
+        raise ArgumentTypeError(f"{what} must return Predicted(…); found {kind(found)}")
+    require_shape(f"{what}: values", found.values, (rows, components))
+    require_shape(f"{what}: by_twist", found.by_twist, (rows, components, 6))
+    for side in ("by_frame", "by_other"):
+        if getattr(found, side) is not None:
+            require_shape(f"{what}: {side}", getattr(found, side), (rows, components, 6))
 
 
 class Lots(NamedTuple):
@@ -121,37 +176,3 @@ def joined(parts: Sequence[Predicted], rows_of: Sequence[IntArray]) -> Predicted
     }
     by = {name: whole([part.by[name] for part in parts]) for name in parts[0].by}
     return Predicted(**numbers, by=by)
-
-
-@dataclass(frozen=True, eq=False)
-class At:
-    """Where a machine is when something is read.
-
-    Attributes
-    ----------
-    pose : ndarray (N, 6)
-        Of the platform in the base frame, mm and rad.
-    other : ndarray (N, 6) or None
-        At the second place.
-    frame, origin : ndarray (6,)
-        Pose of the base in the instrument's frame, counted from `origin`; None: they are one.
-    axis : ndarray of int (N,) or None
-        Of touched lines and planes, which axis of its own each row's has.
-    machines : callable or None
-        Gives pairs of a machine and its rows; for what the pose alone does not determine.
-    measured : Measurements or None
-        The rows.
-    """
-
-    pose: FloatArray
-    other: FloatArray | None = None
-    frame: FloatArray | None = None
-    origin: FloatArray = field(default_factory=lambda: NOWHERE)
-    axis: IntArray | None = None
-    machines: Callable[[], Iterator[tuple[Any, IntArray]]] | None = None
-    measured: Measured | None = None
-
-    def of_rows(self) -> tuple[Measured, Iterator[tuple[Any, IntArray]]]:
-        """The rows and their machines, for a reading that needs both."""
-        assert self.measured is not None and self.machines is not None
-        return self.measured, self.machines()

@@ -23,7 +23,7 @@ from pkmcal.files.csv_writer import WrittenColumn
 from pkmcal.readings import orientation, rows
 from pkmcal.readings.alignment import Laid, Sighting
 from pkmcal.readings.measured import InFit, Measured
-from pkmcal.readings.predicted import At, Lots, Predicted, Shared
+from pkmcal.readings.predicted import At, Lots, Predicted, Shared, require_predicted
 from pkmcal.readings.unknowns import Dependence, Found
 
 Components = tuple[tuple[str, str], ...]
@@ -58,7 +58,7 @@ class Family(NamedTuple):
 
     @property
     def noun(self) -> str:
-        """What they are called."""
+        """Noun for these readings."""
         return {"mm": "lengths", "rad": "angles"}.get(self.unit, f"readings in {self.unit}")
 
 
@@ -169,7 +169,7 @@ class Reading:
 
     @property
     def stands_by(self) -> str:
-        """What stands in that frame: of instruments that `placed` says nothing of, something else.
+        """The thing that stands in that frame, "" of instruments that may be placed anywhere.
 
         Readings of one frame have to agree on it.
         """
@@ -183,9 +183,9 @@ class Reading:
         return None
 
     def shared(self, at: At, lots: Lots, **numbers: FloatArray) -> Shared:
-        """As `predict`, through the motions of lots of rows at one place each.
+        """Compute `predict` through the motions of lots of rows at one place each.
 
-        What it returns stands for many rows by few equations, without a loss.
+        The result stands for many rows by few equations, without a loss.
         """
         raise NotImplementedError
 
@@ -215,7 +215,7 @@ class Reading:
         return m.values
 
     def follows_pose(self, machine: Any) -> bool:
-        """Whether it follows from one pose of the platform, wherever the actuators are."""
+        """Return whether it follows from one pose of the platform, wherever the actuators are."""
         return True
 
     def arguments(self, m: Measured) -> dict[str, FloatArray]:
@@ -232,7 +232,9 @@ class Reading:
     def simulated(self, m: Measured, solve: Solve) -> FloatArray:
         """Compute what the instrument would read without noise, (N, k)."""
         at = At(solve(m.actuators, "q").pose, axis=np.full(len(m), 2))
-        return self.predict(at, **self.arguments(m)).values
+        found = self.predict(at, **self.arguments(m))
+        require_predicted(self.name, len(self.components), len(m), found)
+        return found.values
 
     def doubts(self, m: Measured) -> Iterator[str]:
         """Say what the readings themselves show to be wrong with them, a sentence each."""
@@ -255,7 +257,7 @@ class Reading:
         return values
 
     def by_difference(self, derivative: FloatArray, residual: FloatArray) -> FloatArray:
-        """How `difference` shrinks, (N, k, n), in the place of a derivative of `Predicted`."""
+        """Return how `difference` shrinks, (N, k, n), for a derivative of `Predicted`."""
         if (first := self.turning) is not None:
             for part in lots(len(residual)):
                 by_turning = orientation.by_turning(residual[part, first:])
@@ -270,7 +272,7 @@ class Reading:
         return tuple(unit for _, unit in self.components)
 
     def mm(self, m: Measured, length: float) -> FloatArray:
-        """What one unit of each component is in mm at the machine, (k,) or (N, k).
+        """Return the worth of one unit of each component at the machine, mm, (k,) or (N, k).
 
         Raises
         ------
@@ -287,14 +289,14 @@ class Reading:
 
     @property
     def families(self) -> tuple[Family, ...]:
-        """Its components by their unit: what may be wrong by itself, lengths or angles, say."""
+        """Return the components by unit: lengths or angles, say, may be wrong by themselves."""
         return tuple(
             Family(unit, tuple(k for k, each in enumerate(self.units) if each == unit))
             for unit in dict.fromkeys(self.units)
         )
 
     def arcs(self, m: Measured, length: float) -> FloatArray:
-        """What takes a residual of each component to mm (k,): one number for all rows."""
+        """Return factors from each component's residual to mm (k,): one number for all rows."""
         each = self.mm(m, length)
         return np.asarray(np.median(each, axis=0) if each.ndim > 1 else each, dtype=np.float64)
 
@@ -349,7 +351,7 @@ class Reading:
         return self.with_fields({name: defaults[name] for name in self.truth})
 
     def subject(self, rows: int) -> IntArray:
-        """Which of several things each of `rows` rows is of beside its target, (N,), from 0.
+        """Return the subject of each of `rows` rows beside its target, (N,), from 0.
 
         Rows differ where a field with an entry for every row does, a second place, an attachment:
         they repeat no other then.
@@ -373,7 +375,7 @@ class Reading:
         return dataclasses.replace(self, **changes)  # type: ignore[type-var]
 
     def approached(self, actuators: FloatArray, first: FloatArray | None) -> FloatArray | None:
-        """From where actuators (N, n) came to the second place of each row, (N, n).
+        """Return the approach of actuators (N, n) to the second place of each row, (N, n).
 
         `first` is from where they came to the first; None: not known.
         """
@@ -382,12 +384,12 @@ class Reading:
     # words ----------------------------------------------------------------------------------------
 
     def noun(self, count: int = 2) -> str:
-        """What one, or several, are called."""
+        """Return the noun for one, or for several."""
         one, several = self.nouns or (self.name, f"{self.name}s")
         return one if count == 1 else several
 
     def title(self, m: Measured) -> str:
-        """How many of what they are."""
+        """Return a title: how many readings of which noun, and how many are missing."""
         what = f"{len(m)} measured {self.noun(len(m))}"
         missing = int(np.isnan(m.values.reshape(len(m), -1)).all(axis=1).sum())
         return what + (f" ({missing} not read)" if missing else "")
@@ -433,6 +435,6 @@ class Reading:
         return self.columns(units)
 
     def points(self, m: Measured) -> dict[str, FloatArray]:
-        """Its own points of every row (N, 3), mm, as far as they are stated, by name."""
+        """Return the reading's own points of every row (N, 3), mm, as far as stated, by name."""
         own = {name: getattr(self, name) for name in self.own_points}
         return {name: m.of_points(place) for name, place in own.items() if place is not None}

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Literal, cast
+from collections.abc import Iterable
+from typing import Literal, NamedTuple, cast
 
 from pkmcal.arguments import shown, word
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
+from pkmcal.files.csv_table import Table
 from pkmcal.readings.angles import Angle
 from pkmcal.readings.camera import Camera
 from pkmcal.readings.closure import Closure
@@ -29,13 +31,68 @@ _EVERY: tuple[Reading, ...] = (
 KINDS: dict[Kind, Reading] = {cast(Kind, each.name): each for each in _EVERY}
 
 
+class _Headings(NamedTuple):
+    """A table that has columns of some names and nothing else."""
+
+    columns: dict[str, None]
+
+
+def require_own_columns(kinds: Iterable[Reading]) -> None:
+    """Refuse two kinds of which both would read a table with the columns of one of them.
+
+    Raises
+    ------
+    TypeError
+        Such kinds, by their names; a class without a name.
+    """
+    every = tuple(kinds)
+    for kind in every:
+        headings = dict.fromkeys((*(name for name, _ in kind.components), *kind.labels))
+        table = cast(Table, _Headings(headings))
+        mine = [each.name for each in every if each.found_in(table)]
+        if len(mine) > 1:
+            raise TypeError(
+                f"kinds {' and '.join(mine)} both read the columns {', '.join(headings)}: names"
+                " of components, or found_in of their classes, have to tell files apart"
+            )
+
+
+require_own_columns(_EVERY)
+
+
 def as_reading(given: Kind | Reading, argument: str = "kind") -> Reading:
-    """The instrument itself, or the one that a word stands for."""
+    """The instrument itself, or the one that a word stands for.
+
+    Raises
+    ------
+    TypeError
+        Neither, or a reading whose class does not state its name and its components.
+    ValueError
+        An unknown word.
+    """
     if isinstance(given, Reading):
+        _require_stated(given, argument)
         return given
     if not isinstance(given, str):
         raise ArgumentTypeError(f"{argument} must be a word or a Reading, found {shown(given)}")
     return KINDS[word(argument, given, KINDS)]
+
+
+def _require_stated(reading: Reading, argument: str) -> None:
+    of = type(reading)
+    if not isinstance(reading.name, str) or not reading.name:
+        raise ArgumentTypeError(
+            f'{argument}: the class {of.__name__} has to state its name, as in name = "loop"'
+        )
+    pairs = reading.components
+    stated = isinstance(pairs, tuple) and all(
+        isinstance(pair, tuple) and [*map(type, pair)] == [str, str] for pair in pairs
+    )
+    if not stated or (not pairs and not isinstance(reading, Closure)):
+        raise ArgumentTypeError(
+            f"{argument}: the class {of.__name__} has to state its components with their units, as"
+            f' in components = (("length", "mm"),); found {shown(pairs)}'
+        )
 
 
 def stated(kind: Kind | Reading | str | None, instrument: Reading | None) -> Reading:

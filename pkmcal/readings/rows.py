@@ -46,12 +46,12 @@ def signs(name: str, given: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
 
 
 def is_name(text: str) -> bool:
-    """Whether a name can be written and read: on one line, not empty, not too long."""
+    """Return whether a name can be written and read: on one line, not empty, not too long."""
     return 0 < len(text) <= LONGEST_NAME and text == " ".join(text.split())
 
 
 def names(argument: str, given: Sequence[str] | TextArray, rows: int) -> TextArray:
-    """One name per row; of one row the name alone will do."""
+    """Check names, one per row; of one row the name alone will do."""
     if isinstance(given, str) and rows == 1:
         given = [given]
     found = words(argument, given.tolist() if isinstance(given, np.ndarray) else given)

@@ -1,4 +1,4 @@
-"""Which of the two places at which a flat board looks alike it is at, by all pictures together.
+"""Choice between the two places at which a flat board looks alike, by all pictures.
 
 Of the true places M = F P T holds in every picture, with one frame and one tool; mirrored ones
 contradict each other. From a few pictures drawn at random, each place chosen by chance, frame and
@@ -81,7 +81,7 @@ def _agreed(
     rides: bool,
     pose: FloatArray,
 ) -> tuple[FloatArray, bool]:
-    """As `tool_places`; and whether most pictures show the board from behind."""
+    """Return `tool_places`, and whether most pictures show the board from behind."""
     boards = board_poses(corner, pixel, lens, picture)
     seen = np.where(boards.possible[:, :, None], boards.pose, np.nan)
     behind = bool(np.median(facing(boards)) < 0.0)
@@ -91,7 +91,7 @@ def _agreed(
 
 
 def in_agreement(seen: FloatArray, pose: FloatArray) -> FloatArray:
-    """Of places (P, 2, 6) those (P, 6) that agree with poses (P, 6) of the platform.
+    """Choose of places (P, 2, 6) those (P, 6) that agree with poses (P, 6) of the platform.
 
     The second place is NaN where there is but one.
     """
@@ -122,7 +122,7 @@ def in_agreement(seen: FloatArray, pose: FloatArray) -> FloatArray:
 
 
 def disagreement(seen: FloatArray, pose: FloatArray) -> float:
-    """How far the median picture is from one frame and one tool, by places (P, 6) of each.
+    """Return the median picture's distance from one frame and tool, by places (P, 6) of each.
 
     An angle, and a share of the distance added to it.
     """
@@ -136,7 +136,7 @@ def _taken(seen: FloatArray, chosen: IntArray) -> FloatArray:
 
 
 def _misfits(seen: FloatArray, pose: FloatArray, some: IntArray, sides: IntArray) -> FloatArray:
-    """How far the places of each picture (P, k) are from the frame and tool of some of them."""
+    """Return each picture's places' (P, k) misfits to the frame and tool of some of them."""
     frame, tool = of_frame_and_tool(seen[some, sides], pose[some])
     laid = compose(compose(frame, pose), tool)
     distance = float(np.median(np.linalg.norm(seen[:, 0, :3], axis=1)))

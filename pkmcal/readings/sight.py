@@ -1,4 +1,4 @@
-"""What a camera can see of a board: what is in the picture, and not too slanting to be found."""
+"""Corners of a board that a camera can see: in the picture, and not too slanting."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def visible(
     size: tuple[int, int],
     margin: float = 0.0,
 ) -> BoolArray:
-    """Which corners (N,) a camera sees.
+    """Mark corners (N,) that a camera sees.
 
     Those before it and in its picture, of a board that it sees from the front and not too slanting,
     where its distortion does not fold: farther out, points come back into the picture that no lens

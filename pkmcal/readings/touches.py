@@ -92,7 +92,7 @@ class Touch(Reading):
         place: FloatArray = NOWHERE,
         **numbers: FloatArray,
     ) -> Predicted:
-        """How far `target` (N, 3) is off the artefact, in its axes, mm.
+        """Return how far `target` (N, 3) is off the artefact, in its axes, mm.
 
         A sphere has its centre `anchor` (N, 3) and radius `zero` (N, 1), any other artefact a pose
         `place` (N, 6).
@@ -139,7 +139,7 @@ class Touch(Reading):
     def of_rows(
         self, values: Any, actuators: FloatArray, targets: int | None
     ) -> tuple[Touch, ArrayLike | None]:
-        """One name a row; the values may be these names."""
+        """Check the names, one a row; the values may be these names."""
         rows_, argument, touched = len(actuators), "touched", self.touched
         if touched is None:
             if isinstance(values, str) and rows_ == 1:
@@ -153,7 +153,7 @@ class Touch(Reading):
         return self.with_fields({"touched": named, "distances": known}), values
 
     def title(self, m: Measured) -> str:
-        """How many touches of how many artefacts."""
+        """Return a title that counts touches and artefacts."""
         count = len(np.unique(self._names))
         return f"{super().title(m)} of {count} {self.artefact}{'' if count == 1 else 's'}"
 
@@ -168,7 +168,7 @@ class Touch(Reading):
         return named | (off & table.columns.keys())
 
     def read(self, table: Table, units: Sequence[str]) -> Touch:
-        """What is touched, and known distances."""
+        """Read the touched artefacts, and known distances."""
         name = self.found_in(table)[0]
         artefact = name.partition(":")[2] or "point"
         if artefact not in TOUCHES:
@@ -180,7 +180,7 @@ class Touch(Reading):
         return Touch(np.array(table.texts(name)), artefact, known)
 
     def columns_read(self, table: Table) -> Components:
-        """Those of the components that are there: none where the machine touched alone."""
+        """Return the components' columns that are there: none where the machine touched alone."""
         return tuple(pair for pair in self.components if pair[0] in table.columns)
 
     def value_columns(self, values: FloatArray) -> Iterator[WrittenColumn]:
@@ -189,7 +189,7 @@ class Touch(Reading):
             yield from super().value_columns(values)
 
     def columns(self, units: Sequence[str]) -> Iterator[WrittenColumn]:
-        """What each row touches."""
+        """Write what each row touches."""
         of = "" if self.artefact == "point" else f":{self.artefact}"
         yield WrittenColumn(f"touch{of}", "", self._names)
 
@@ -226,7 +226,7 @@ class TouchDistance(Reading):
         return _of_touched(place, anchor)
 
     def dependences(self, data: InFit) -> Iterator[Dependence]:
-        """Both artefacts."""
+        """Return the artefacts as dependences."""
         one, other = zip(*((one, other) for one, other, _, _ in self.distances), strict=True)
         yield always("place", "touch", PLACE, one, data.starts)
         yield always("anchor", "touch", POINT, other, data.starts)
@@ -236,7 +236,7 @@ class TouchDistance(Reading):
         return []
 
     def names(self, table: Table) -> set[str]:
-        """None."""
+        """Return no names of columns: they are read elsewhere."""
         return set()
 
 

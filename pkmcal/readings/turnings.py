@@ -37,7 +37,7 @@ _AXES = ("x", "y", "z")
 
 @dataclass(frozen=True, eq=False)
 class Pose(Reading):
-    """Where the platform is and how it is turned, or a tool on it."""
+    """Position and orientation of the platform, or of a tool on it."""
 
     name = "pose"
     components = PLACE
@@ -81,7 +81,7 @@ class Pose(Reading):
 
 @dataclass(frozen=True, eq=False)
 class Orientation(Reading):
-    """How the platform is turned, or a sensor on it.
+    """Orientation of the platform, or of a sensor on it.
 
     Attributes
     ----------
@@ -104,7 +104,7 @@ class Orientation(Reading):
         return _orientations(at.pose, mounting, at.frame, at.origin)
 
     def dependences(self, data: InFit) -> Iterator[Dependence]:
-        """How the sensor is mounted, where that is unknown."""
+        """Return the sensor's mounting, where that is unknown."""
         if data.unknown_target:
             yield always("mounting", "mounting", ANGLES, [""] * len(data.measured), data.starts)
 
@@ -128,7 +128,7 @@ class Orientation(Reading):
 
 @dataclass(frozen=True, eq=False)
 class Tilt(Orientation):
-    """How far the x and y axes of a sensor on the platform point up; its mounting is not known.
+    """Tilt: how far a sensor's x and y axes point up; its mounting is not known.
 
     Attributes
     ----------
@@ -150,7 +150,7 @@ class Tilt(Orientation):
         return _tilts(at.pose, mounting, at.frame, at.origin)
 
     def dependences(self, data: InFit) -> Iterator[Dependence]:
-        """How the sensor is mounted."""
+        """Return the sensor's mounting."""
         yield always("mounting", "mounting", ANGLES, [""] * len(data.measured), data.starts)
 
     def starts(self, machine: Any, sets: Sets, found: Found) -> None:
@@ -165,7 +165,7 @@ class Tilt(Orientation):
 def _mounted(
     sets: Sets, found: Found, of: Callable[[FloatArray, FloatArray, bool], FloatArray]
 ) -> None:
-    """How a sensor is mounted: by orientations if any were read, else by tilts."""
+    """Find the mounting of a sensor: by orientations if any were read, else by tilts."""
     if ("mounting", "") in found:
         return
     values = np.concatenate([data.measured.values for data, _ in sets])
@@ -241,7 +241,7 @@ def _tilts(
 
 
 def _frame_turning(frame: FloatArray | None, origin: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """From the base's axes to the instrument's (3, 3), and turnings there by the frame's angles."""
+    """Return the rotation from base to instrument (3, 3), and its turnings by the frame."""
     if frame is None:
         return np.eye(3), np.zeros((3, 3))
     outer = orientation.rotations(origin[None, 3:])[0]

@@ -10,7 +10,7 @@ from pkmcal.readings import orientation
 
 
 def adjoint(motion: FloatArray) -> FloatArray:
-    """Of motions (N, 4, 4), (N, 6, 6)."""
+    """Return adjoints of motions (N, 4, 4), (N, 6, 6)."""
     flat = np.ascontiguousarray(motion).reshape(-1, 16)
     matrices: FloatArray = screws.adjoint(flat).reshape(-1, 6, 6)
     return matrices

@@ -1,4 +1,4 @@
-"""What readings depend on beside the pose: numbers that are given or estimated."""
+"""Dependences of readings beside the pose: numbers that are fixed or estimated."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Numbers:
 
 @dataclass(frozen=True, eq=False)
 class Dependence:
-    """What an argument of `Reading.predict` is in the rows of a set.
+    """A dependence: an argument of `Reading.predict` in the rows of a set.
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ class Dependence:
     role : str
         What it is to users: "target", "anchor", "attachment", "tool", "run", "angle" …
     given : ndarray (N, w)
-        Its numbers, as far as they are known.
+        Its numbers in each row of the set, as far as they are known.
     estimated : mapping of str to Numbers
         Those that are estimated, by the name that rows have in common.
     index : ndarray of int (N,)
@@ -69,7 +69,7 @@ class Dependence:
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """Where an artefact, a zero or a sensor is found with the nominal machine.
+    """The start of an artefact, a zero or a sensor, found with the nominal machine.
 
     Attributes
     ----------
@@ -113,10 +113,20 @@ def always(
         Where the search for each begins, by role and name.
     scale : sequence of float, optional
         Of each number, as in `Numbers`; needed where its unit is none of the package's.
+
+    Raises
+    ------
+    ValueError
+        A name of which `starts` has no `Start`.
     """
     estimated = {}
     for name in dict.fromkeys(names):
-        start = starts[role, name]
+        start = starts.get((role, name))
+        if not isinstance(start, Start):
+            raise ArgumentError(
+                f"{argument}: the search for {role} {str(name)!r} has no start: the method starts"
+                f" of the reading has to set found[{role!r}, {str(name)!r}] = Start(…)"
+            )
         chosen = [numbers[slot] for slot in start.slots]
         whose = ".".join(filter(None, (role.partition(" ")[0], name)))
         estimated[name] = Numbers(

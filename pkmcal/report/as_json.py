@@ -56,7 +56,7 @@ def _escaped(line: str) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """The same in lists, dicts, numbers and text."""
+    """Return an object as lists, dicts, numbers and text."""
     if isinstance(value, Robot | SerialArm):
         geometry = as_machine(value).geometry
         numbers = zip(geometry.names, geometry.values.tolist(), strict=True)

@@ -1,4 +1,4 @@
-"""What a certificate states beside the report: who, what, with what, and how uncertain it is."""
+"""Statements of a certificate beside the report: who, what, with what, how uncertain."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _ROUNDED = 0.1  # K, to which temperatures are stated
 
 @dataclass(frozen=True)
 class Statement:
-    """What the file of a certificate says.
+    """The content of a certificate's file.
 
     Attributes
     ----------
@@ -114,7 +114,7 @@ def _positive(table: Table, key: str, default: float) -> float:
 
 
 def budget(found: Identification, stated: Statement, predicted: FloatArray) -> Budget:
-    """What a coordinate of the tool's position is uncertain by, over all of the workspace together.
+    """Return the uncertainty budget of a coordinate of the tool's position over the workspace.
 
     Parameters
     ----------
@@ -197,7 +197,7 @@ def _same_heat(found: Identification, stated: Statement) -> None:
 
 
 def _shared_noise(found: Identification, stated: Statement) -> float:
-    """What residuals scatter by and U of the instrument holds already, mm: its noise.
+    """Return noise that residuals and U of the instrument both hold, mm.
 
     As good as `sigma` says, and no more than the instrument's own uncertainty; 0 where one of them
     is not stated.
@@ -216,14 +216,14 @@ def _beyond(scatter: float, noise: float) -> float:
 
 
 def _of_noise(noise: float) -> str:
-    """Whether a scatter holds the noise of the instrument, in words."""
+    """Say whether a scatter holds the noise of the instrument."""
     if noise:
         return f"less the noise of the instrument, {noise:.3g} mm, which its U holds"
     return "noise of the instrument included"
 
 
 def _misfit(found: Identification, stated: Statement) -> list[Contribution]:
-    """What machine and model miss: repeats tell one from the other."""
+    """Return the misfit of machine and model: repeats tell one from the other."""
     sure, noise = found.fit.uncertainty, _shared_noise(found, stated)
     split = sure.repeats(plain=True)
     if np.isfinite(found.repeatability):
@@ -264,14 +264,14 @@ def _shown(stated: Statement, read: tuple[float, float] | None) -> str:
 
 
 def _reference(found: Identification) -> str:
-    """At which temperature the lengths of the machine are what was identified."""
+    """State the temperature at which the machine's lengths are those identified."""
     if found.expansion:
         return f"{REFERENCE:g} °C (ISO 1): the lengths stated are those at it"
     return f"{REFERENCE:g} °C (ISO 1): not reduced to it, lengths are as at the measurement"
 
 
 def _expansion(found: Identification, stated: Statement) -> str:
-    """Which expansion was calibrated with, and how well it is known."""
+    """Return the thermal expansion that was used, and its uncertainty."""
     sure = ", its uncertainty is not stated"
     if stated.expansion_uncertainty > 0:
         sure = f", ± {stated.expansion_uncertainty * 1e6:.3g} µm/m/K"
@@ -283,7 +283,7 @@ def _expansion(found: Identification, stated: Statement) -> str:
 
 
 def _extent(positions: FloatArray) -> dict[str, list[float]]:
-    """From where to where the tool goes along each axis, mm."""
+    """State the extent of the tool's positions along each axis, mm."""
     if not len(positions):
         return {}
     ends = zip(positions.min(axis=0).tolist(), positions.max(axis=0).tolist(), strict=True)

@@ -1,4 +1,4 @@
-"""What a calibration report says, as numbers and sentences; `report` renders it."""
+"""Content of a calibration report: numbers and sentences; `report` renders it."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class WorkspaceAccuracy:
 
     @property
     def predicted(self) -> FloatArray:
-        """Those of `accuracy` that are finite."""
+        """Return the finite entries of `accuracy`."""
         return self.accuracy[np.isfinite(self.accuracy)]
 
 
@@ -78,7 +78,7 @@ def instrument_identified(found: Identification) -> bool:
 
 
 def export_command(found: Identification) -> str:
-    """What writes the calibrated machine for the firmware it was imported from; "" of others."""
+    """Return the command that writes the calibrated machine for its firmware; "" of others."""
     if isinstance(found.robot, SerialArm) or found.robot.model.controller is None:
         return ""
     return found.robot.model.controller.command("robot.toml")

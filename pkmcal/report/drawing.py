@@ -1,4 +1,4 @@
-"""What all figures share: colours, one context of matplotlib, an empty figure, and its bytes."""
+"""Common parts of all figures: colours, matplotlib's context, an empty figure, its bytes."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def empty_figure(
 
 
 def sample(count: int, first: BoolArray | None = None) -> IntArray:
-    """Which of many rows a figure draws, in order: at most `MOST_DRAWN`, evenly spaced.
+    """Choose rows for a figure, in order: at most `MOST_DRAWN`, evenly spaced.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def sample(count: int, first: BoolArray | None = None) -> IntArray:
 
 
 def _spaced(rows: IntArray, most: int) -> IntArray:
-    """At most so many of these, the ends among them."""
+    """Choose at most so many entries, the ends included."""
     if len(rows) <= most:
         return rows
     return rows[np.round(np.linspace(0, len(rows) - 1, most)).astype(np.intp)]

@@ -107,7 +107,7 @@ def mean_errors(found: Sensitivity, title: str) -> Figure:
 
 
 def _groups(found: Sensitivity) -> list[tuple[list[int], str, float]]:
-    """What moves: places in x y z α β γ, the unit shown and its factor."""
+    """Group what moves: places in x y z α β γ, the unit shown and its factor."""
     sizes = np.nan_to_num(np.abs(found.exact)).reshape(-1, 6).max(axis=0)
     groups = []
     for first, unit, factor in ((0, "mm", 1.0), (3, "deg", 180 / np.pi)):

@@ -1,4 +1,4 @@
-"""Where a report looks at a machine: poses of its workspace, and a slice of it."""
+"""Poses of the workspace, and a slice of it, at which a report looks at a machine."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def in_the_workspace(found: Identification) -> Places | str:
 
 
 def _endless(robot: Robot) -> bool:
-    """Whether nothing says how far legs, cables or carriages go: a workspace may be anywhere."""
+    """Return whether nothing limits legs, cables or carriages: the workspace may be anywhere."""
     return not robot.model.workspace and any(
         drive.stroke is None and not drive.angle for drive in robot.model.drives
     )

@@ -29,7 +29,7 @@ def residual_vectors(equations: Equations, at: Evaluation) -> FloatArray:
 
 
 def measured_places(equations: Equations, end: Evaluation) -> FloatArray:
-    """Where the measured points of all rows are in the robot's base frame, mm (N, 3)."""
+    """Return the measured points of all rows in the robot's base frame, mm (N, 3)."""
     parts = []
     for i in range(len(equations.table.sets)):
         target = equations.prediction.arguments_of(i, end.theta).get("target")

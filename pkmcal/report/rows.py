@@ -22,7 +22,7 @@ Use = Literal["fitted", "held out", "left out"]
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """All rows, those that were fitted first.
+    """Rows of a calibration, the fitted ones first.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What a report says of a machine that yields: how stiff it is, and what a cut does to it."""
+"""Section of a report on a machine that yields: its stiffness, and the effect of a cut."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Map:
 
 @dataclass(frozen=True, eq=False)
 class Yielding:
-    """How stiff a machine is.
+    """Stiffness of a machine, for its report.
 
     Attributes
     ----------
@@ -85,7 +85,7 @@ class Yielding:
         return matrix_cells(self.matrix)
 
     def static_rows(self) -> list[tuple[float, list[float]]]:
-        """Each force with how far it moves the tool along +x, -x, +y, -y, +z, -z, mm."""
+        """List forces with the tool's motion along +x, -x, +y, -y, +z, -z, mm."""
         if self.static is None:
             return []
         sizes = np.linalg.norm(self.static.displacement, axis=2).T
@@ -93,7 +93,7 @@ class Yielding:
 
 
 def of(robot: Robot | SerialArm, places: Places | None) -> Yielding | None:
-    """How stiff a machine is at poses and at home; None of arms and where nothing yields."""
+    """Return the stiffness at poses and at home; None for arms and where nothing yields."""
     if isinstance(robot, SerialArm) or robot is robot.rigid:
         return None
     home = robot.home

@@ -53,13 +53,13 @@ class Contribution:
 
     @property
     def share(self) -> float:
-        """Its part of the combined standard uncertainty, in the unit of the result."""
+        """Share of the combined standard uncertainty, in the unit of the result."""
         return abs(self.sensitivity) * self.standard
 
 
 @dataclass(frozen=True)
 class Budget:
-    """What a result is uncertain by.
+    """Budget of uncertainty of a result.
 
     Attributes
     ----------

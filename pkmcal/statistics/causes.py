@@ -1,4 +1,4 @@
-"""Which of several causes explain what a fit leaves: score tests, one after the other.
+"""Score tests of several causes of a fit's residuals, one after the other.
 
 Each cause is some columns beside the design. The one that explains most beyond chance is taken
 first; the others are then tested beside it. All chances are times the number of causes.
@@ -104,7 +104,7 @@ def _with(taken: Beside, score: Score) -> LinearFit:
 
 
 def _shift(taken: Beside, score: Score) -> float:
-    """How far a cause moves the parameters, in standard deviations by what it leaves, rms."""
+    """Return the parameters' shift by a cause, in standard deviations with it, rms."""
     fit = taken.fit
     moved = fit.back @ (taken.by_basis @ score.size)
     noise = np.sqrt(max(fit.squares - score.drop, 0.0) / max(fit.freedom - len(score.size), 1.0))

@@ -66,7 +66,7 @@ def _adjusted(matrix: FloatArray, values: FloatArray, part: FloatArray) -> Float
 
 
 def _block(rows: IntArray, part: FloatArray) -> _Block:
-    """Of clusters of equations (g, m) whose part of the design is (g, m, p)."""
+    """Compute clusters of equations (g, m) with designs (g, m, p)."""
     wide = rows.shape[1] <= part.shape[2]
     inner = part @ part.transpose(0, 2, 1) if wide else part.transpose(0, 2, 1) @ part
     values, vectors = np.linalg.eigh(inner)

@@ -79,7 +79,7 @@ class Covariance:
 
     @cached_property
     def _prior(self) -> FloatArray:
-        """The same as far as the prior's do."""
+        """Return the matrix with the prior's part of it."""
         known: FloatArray = self.fit.prior.T @ self.fit.prior
         return known
 

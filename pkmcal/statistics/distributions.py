@@ -29,7 +29,7 @@ def t_factor(freedom: FloatArray) -> FloatArray:
 
 
 def deviation_interval(freedom: float) -> tuple[float, float]:
-    """How many times an estimated deviation the true one may be, in 95 % of estimates.
+    """Return 95 % bounds of a true deviation, in multiples of the estimated one.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Whether repeats of the same poses move with time: one trend that all poses have in common.
+"""Test of drift in repeats of the same poses: one trend that all poses have in common.
 
 Of each pose the mean is taken off, of values and times; what is left is regressed on time. The
 slope of each component is tested by Student's t with its own scatter, and the smallest chance is

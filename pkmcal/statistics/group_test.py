@@ -1,4 +1,4 @@
-"""Whether two groups of equations have different parameters.
+"""Check whether two groups of equations have different parameters.
 
 The F test of G. C. Chow, Tests of equality between sets of coefficients in two linear regressions,
 Econometrica 28 (1960): parameters of its own for one group explain more of the residuals than
@@ -25,7 +25,7 @@ _NEW = 1e-3  # of a column's length that the common parameters must leave of it
 
 @dataclass(frozen=True)
 class Groups:
-    """How unlike two groups are.
+    """Two groups' difference.
 
     Attributes
     ----------
@@ -225,7 +225,7 @@ def group_test(
 
 
 def _own(common: FloatArray, residual: FloatArray, mine: BoolArray) -> tuple[FloatArray, ...]:
-    """What numbers of its own explain for a group, beside the basis `common` (M, k).
+    """Explain a group by its own numbers beside the basis `common` (M, k).
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Whether points that were held out contradict the fit.
+"""Check whether points that were held out contradict the fit.
 
 Their mean square is compared with what noise and covariance let expect, by an F test whose degrees
 of freedom are Satterthwaite's: equations of one pose share errors, and poses may be unlike (F. E.
@@ -45,7 +45,7 @@ class HoldoutTest:
 
     @property
     def contradicts(self) -> bool:
-        """Whether the points contradict the fit: by chance, rms and median."""
+        """True if the points contradict the fit: by chance, rms and median."""
         return self.few_off and self.median_ratio > RATIO
 
     @property
@@ -55,18 +55,18 @@ class HoldoutTest:
 
     @property
     def chance_nearer(self) -> float:
-        """How likely a ratio as small would be if fit, noise and covariance were right."""
+        """Chance of a ratio as small if fit, noise and covariance were right."""
         first, second = self.freedom
         return f_tail(self.ratio**-2, second, first) if self.ratio > 0.0 else 0.0
 
     @property
     def nearer(self) -> bool:
-        """Whether the points are nearer than noise and covariance let expect."""
+        """True if the points are nearer than noise and covariance let expect."""
         return self.ratio < 1.0 / RATIO and self.chance_nearer < NEARER
 
     @property
     def few_off(self) -> bool:
-        """Whether their rms contradicts it, which a few points can do."""
+        """True if the rms alone contradicts the fit, which a few points can cause."""
         return self.chance < CHANCE and self.ratio > RATIO
 
 

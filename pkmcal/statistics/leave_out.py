@@ -1,4 +1,4 @@
-"""Each cluster of rows left out in turn: what a linear model that does without it misses there.
+"""Misfit of a linear model at each cluster of rows that it was left without.
 
 In closed form: where a fit with the design A, AᵀA + RᵀR = 1, has the residuals r, the one without
 the rows k misses (1 - A_k A_kᵀ)⁻¹ r_k there. It is exact for a linear model with a prior R.

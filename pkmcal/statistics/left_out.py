@@ -102,7 +102,7 @@ def residuals_left_out(fit: LinearFit, block: IntArray) -> FloatArray:
 
 
 def _known(size: FloatArray) -> BoolArray:
-    """Which combinations the other blocks determine, by squared singular values of a block."""
+    """Return combinations that the other blocks determine, by a block's squared singular values."""
     known: BoolArray = size < _OWN
     return known
 

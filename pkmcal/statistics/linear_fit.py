@@ -68,7 +68,7 @@ class LinearFit:
 
     @property
     def clusters(self) -> int:
-        """How many clusters there are."""
+        """Number of clusters."""
         return int(self.cluster.max()) + 1
 
     @cached_property
@@ -219,7 +219,7 @@ def column_basis(matrix: FloatArray) -> FloatArray:
 
 
 def orthonormal(matrix: FloatArray | Sequence[FloatArray]) -> FloatArray:
-    """What the columns (M, n) are multiplied by, (n, r), to become a basis of theirs.
+    """Return the factor (n, r) that makes columns (M, n) an orthonormal basis.
 
     The matrix may be several side by side.
     """

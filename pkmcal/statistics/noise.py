@@ -1,4 +1,4 @@
-"""What residuals say of the noise: of one reading, shared by a pose, of repeats, and lack of fit.
+"""Noise of residuals: of a reading, shared by a pose, of repeats, and lack of fit.
 
 Residuals of rows that repeat a pose are split into what they scatter about their common mean, the
 pure error, which the model has no part in, and the mean, which is what the model misses there. If
@@ -87,7 +87,7 @@ class Split:
 
     @property
     def chance(self) -> float:
-        """How likely a ratio as large would be if the model were right; NaN without a ratio."""
+        """Chance of a ratio as large if the model were right; NaN without a ratio."""
         return f_tail(self.ratio, self.missed_freedom, self.pure_freedom)
 
     @property

@@ -1,4 +1,4 @@
-"""Whether residuals change with the order of measuring: an F test in the linear model at a fit.
+"""Test of residuals against the order of measuring: F in the linear model at a fit.
 
 Each component of what was read is given a slow course of its own, the first waves of a discrete
 cosine transform over the visits: a drift, a warming up, a jump are mostly these. They enter the
@@ -32,7 +32,7 @@ _VISITS = 1024  # visits of which jumps are looked for at once, likewise
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """How the residuals of a series of visits change.
+    """Change of residuals in a series of visits.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class Course:
 
     @property
     def shift(self) -> FloatArray:
-        """How far each component went, (k,): by the jump, or from its lowest to its highest."""
+        """Shift of each component, (k,): by the jump, or from its lowest to its highest."""
         if self.jump is not None:
             behind: FloatArray = self.values[-1]
             return behind
@@ -102,12 +102,12 @@ class Series:
 
     @property
     def visits(self) -> int:
-        """How many there are."""
+        """Number of visits."""
         return int(self.visit.max()) + 1
 
     @cached_property
     def _unit(self) -> FloatArray:
-        """How much of each component (k,) changes an equation by 1; 0 of what was not read."""
+        """Return the part of each component (k,) that changes an equation by 1; 0 if not read."""
         squares, count = np.zeros((2, self.by_component.shape[1]))
         for rows in lots(len(self.visit)):
             mine = self.by_component[rows][self.visit[rows] >= 0]
@@ -124,7 +124,7 @@ class Series:
 
     @cached_property
     def _factor(self) -> FloatArray:
-        """What `_both` is multiplied by, (p + k, r), to become a basis."""
+        """Return the factor (p + k, r) that makes `_both` a basis."""
         factor = np.zeros((0, self.design.shape[1] + self.by_component.shape[1]))
         for rows in lots(len(self.visit)):
             factor = triangle(factor, [self.design[rows], self._own(rows)])
@@ -137,7 +137,7 @@ class Series:
         return both
 
     def _onto(self, columns: FloatArray, rows: slice) -> FloatArray:
-        """What parameters and constants have in common with rows of columns (b, ...)."""
+        """Project parameters and constants onto rows of columns (b, ...)."""
         return np.concatenate([self.design[rows].T @ columns, self._own(rows).T @ columns])
 
     @cached_property

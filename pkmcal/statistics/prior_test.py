@@ -1,4 +1,4 @@
-"""Whether data contradict a prior, and the noise as the data alone show it.
+"""Check whether data contradict a prior, and the noise as the data alone show it.
 
 The prior predictive check: what the data say of the parameters, less the prior's centre, is
 compared with what prior and noise let expect (G. E. P. Box, Sampling and Bayes' inference in
@@ -48,12 +48,12 @@ class PriorTest:
 
     @property
     def chance_of_either(self) -> float:
-        """How likely the mean square or the largest pull would be as large."""
+        """Chance of a mean square or a largest pull as large."""
         return min(1.0, 2.0 * min(self.chance, self.pull_chance))
 
     @property
     def contradicted(self) -> bool:
-        """Whether the data contradict the prior."""
+        """True if the data contradict the prior."""
         return self.chance_of_either < CONTRADICTED
 
 

@@ -1,4 +1,4 @@
-"""How far a few rows carry a least-squares fit: its noise beside that of a robust one.
+"""Noise of a least-squares fit beside that of a robust one: rows that carry the fit.
 
 The robust fit is that of the linear model at the solution, reweighted by the Cauchy loss; it costs
 no evaluation of the machine.

@@ -1,4 +1,4 @@
-"""Whether numbers that a fit held would explain its residuals: a score test by clusters.
+"""Check whether numbers that a fit held would explain its residuals: a score test by clusters.
 
 Rao's test needs no other fit: the residuals are regressed on the part of the held numbers' columns
 that the parameters cannot take up. Errors that the equations of a cluster share count by the
@@ -34,7 +34,7 @@ def columns_of(matrix: FloatArray) -> Columns:
 
 @dataclass(frozen=True, eq=False)
 class Score:
-    """What held numbers would explain.
+    """The score of held numbers.
 
     Attributes
     ----------
@@ -86,7 +86,7 @@ class Beside:
 
     @property
     def chance(self) -> float:
-        """How likely as much would be explained if errors were independent; 1 if none are left."""
+        """Chance of explaining as much if errors were independent; 1 if no numbers are left."""
         k, drop = len(self.along), self.drop
         rest = self.fit.freedom - k
         if not k or rest < 1.0:

@@ -1,4 +1,4 @@
-"""Which parameters shifted between the data that were fitted and data that came later.
+"""Shifts of parameters between fitted data and later data.
 
 Both are described by common parameters and, one after the other, a shift of the parameter that
 lowers the sum of squares most, as long as its score test says so (G. C. Chow, Tests of equality
@@ -146,7 +146,7 @@ def shifted(
 def _trial(
     j: int, columns: FloatArray, common: FloatArray, y: FloatArray, left: FloatArray
 ) -> _Trial | None:
-    """What candidate `j` would take off the sum of squares; None if nothing new."""
+    """Return the fall of the sum of squares by candidate `j`; None if it adds nothing."""
     beside = columns - common @ (common.T @ columns)
     turn, singular, _ = svd(beside)
     basis = turn[:, singular > _SAME * float(np.linalg.norm(columns))]
@@ -230,7 +230,7 @@ def _together(
 def _beside(
     columns: Sequence[FloatArray], raw: Sequence[FloatArray], whole: FloatArray
 ) -> FloatArray:
-    """What else shifts where several of a kind did: the others of a candidate of several.
+    """Return other shifts of a kind in which several shifted.
 
     Each may be too small to be found, or a shift of all alike is found in their place, beside which
     one that is named has shifted by less than its own. Nothing where they cannot be told apart.

@@ -16,7 +16,7 @@ _HELD = 1e-6  # weight of the common parameters, for those that a group does not
 
 
 def best_division(design: FloatArray, residual: FloatArray, unit: IntArray) -> BoolArray:
-    """Which units (N,) are of the smaller of two groups.
+    """Mark units (N,) of the smaller of two groups.
 
     Parameters
     ----------

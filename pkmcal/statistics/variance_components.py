@@ -146,7 +146,7 @@ class _Model:
         self.floor = _TINY * float(self.square.sum() / self.count.sum())
 
     def at(self, theta: FloatArray) -> _Point | None:
-        """At variances (c,); None where a class has no freedom left."""
+        """Evaluate at variances (c,); None where a class has no freedom left."""
         weighted = self._inner / theta[:, None, None]
         normal = weighted.sum(axis=0) + self._known
         plain = np.linalg.inv(normal)
@@ -175,7 +175,7 @@ class _Model:
         return _Point(theta, likelihood, slope, curvature, information, plain, slopes)
 
     def highest(self, freedom: float) -> _Point | None:
-        """Where the likelihood is highest, from equal degrees of freedom on; None as `at`."""
+        """Maximise the likelihood from equal degrees of freedom on; None as `at`."""
         factor = len(self.classes) / max(freedom, 1.0)
         here = self.at(np.maximum(self.square / self.count * factor, self.floor))
         for _ in range(_ROUNDS):
@@ -200,7 +200,7 @@ class _Model:
         return here
 
     def among(self, coarse: IntArray, theta: FloatArray) -> _Point | None:
-        """Where coarser classes (M,) have variances theta; None as `at`."""
+        """Estimate variances theta of coarser classes (M,); None as `at`."""
         return self.at(theta[self._containing(coarse)])
 
     def score_chance(self, here: _Point, classes: IntArray, coarse: int) -> float:
@@ -215,7 +215,7 @@ class _Model:
         return chi2_tail(max(steep, 0.0), mine.shape[1] - coarse)
 
     def _containing(self, coarse: IntArray) -> IntArray:
-        """Which coarse class (M,) each class of the model is part of."""
+        """Return the coarse class (M,) of each class of the model."""
         found = np.empty(len(self.count), dtype=np.intp)
         found[self.classes] = coarse
         return found

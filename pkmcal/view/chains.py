@@ -1,4 +1,4 @@
-"""What the page draws of chains of joints, and compares with their strokes and cones."""
+"""Chains of joints as the page draws them and compares them with strokes and cones."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pkmcal.screw import from_pose
 
 
 def strokes(chains: Chains, slots: FloatArray) -> list[tuple[float, float] | None]:
-    """Of each actuator the limits of its coordinate."""
+    """Return the limits of each actuator's coordinate."""
     place = chains.layout.drive_place
     offset, gain = slots.ravel()[place], slots.ravel()[place + 1]
     found: list[tuple[float, float] | None] = []

@@ -26,13 +26,13 @@ def within(robot: Robot) -> tuple[AnyMachine, FloatArray]:
 
 
 def ways(robot: Robot, q: FloatArray) -> FloatArray:
-    """How far the drives go at readings (N, n), (N, drives); readings where there is no law."""
+    """Return drives at readings (N, n), (N, drives); readings where there is no law."""
     machine = robot.machine
     return machine.drives(robot.slots, q) if isinstance(machine, DrivenMachine) else q
 
 
 def laws(robot: Robot) -> list[dict[str, Any]] | None:
-    """Of each drive its actuator and the numbers of its law, as ``laws.js`` takes them."""
+    """Return each drive's actuator and its law's numbers, as ``laws.js`` takes them."""
     machine = robot.machine
     if not isinstance(machine, DrivenMachine):
         return None
@@ -63,7 +63,7 @@ def laws(robot: Robot) -> list[dict[str, Any]] | None:
 
 
 def strokes(robot: Robot) -> list[Stroke]:
-    """What the strokes of all drives of each actuator leave of its reading."""
+    """Return what strokes of all an actuator's drives leave of its reading."""
     machine = robot.machine
     assert isinstance(machine, DrivenMachine)
     drives = machine.laws.drives

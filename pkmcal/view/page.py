@@ -84,7 +84,7 @@ def element(data: dict[str, Any]) -> str:
 
 
 def plain_element(data: dict[str, Any]) -> tuple[str, str]:
-    """The same for a page that runs no other script, and the hash by which its policy names it.
+    """Return a page's element without other scripts, and the hash by which its policy names it.
 
     The scripts are as they are, for unpacking them would take the right to run any text.
     """

@@ -26,7 +26,7 @@ _TRACK = 25  # points of the path of a crank's end
 
 
 def beyond(model: Model) -> str:
-    """What of a machine the page cannot hold; empty where it holds all."""
+    """List parts of a machine that the page cannot draw; empty where there are none."""
     if model.bent:
         return "tackles" if model.limbs[model.bent[0]].parts else "pulleys"
     if model.chains is not None and model.chains.layout.loose:
@@ -35,7 +35,7 @@ def beyond(model: Model) -> str:
 
 
 def data(robot: Robot, cloud: bool) -> dict[str, Any]:
-    """All that the page needs of a robot, as JSON has it; mm and rad.
+    """Return the page's data of a robot as JSON has it; mm and rad.
 
     With `cloud` the positions of good poses too, which take a while to find.
     """
@@ -100,7 +100,7 @@ def data(robot: Robot, cloud: bool) -> dict[str, Any]:
 
 
 def _strokes(robot: Robot) -> list[tuple[float, float] | None]:
-    """What the strokes of all limbs of each actuator leave of its coordinate."""
+    """Return what strokes of all an actuator's limbs leave of its coordinate."""
     found: list[tuple[float, float] | None] = [None] * robot.n_actuators
     for limb, numbers in zip(robot.model.limbs, robot.slots, strict=True):
         if limb.stroke is None:
@@ -153,5 +153,5 @@ def _frames(robot: Robot) -> dict[str, Any] | None:
 
 
 def _number(value: float) -> float | None:
-    """None for what JSON has no number for."""
+    """Return a number for JSON; None where it has none."""
     return value if np.isfinite(value) else None

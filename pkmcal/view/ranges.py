@@ -1,4 +1,4 @@
-"""How far the sliders of a page go, where a machine's positions are, and its assembly modes."""
+"""Ranges of a page's sliders, places of a machine, and its assembly modes."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _ANGLE, _LENGTH = np.radians(30.0), 0.2  # where the machine says nothing: rad, 
 
 
 def poses(robot: Robot, size: float, most: float) -> dict[str, tuple[float, float]]:
-    """From where to where each coordinate of the pose alone goes from home, mm and rad.
+    """Return the range of each coordinate of the pose alone from home, mm and rad.
 
     No farther than `most`, mm.
     """
@@ -38,12 +38,12 @@ def poses(robot: Robot, size: float, most: float) -> dict[str, tuple[float, floa
 def sliders(
     robot: Robot, ranges: dict[str, tuple[float, float]], most: float
 ) -> list[tuple[float, float]]:
-    """From where to where the slider of each coordinate goes: beyond what is reached."""
+    """Return the range of each coordinate's slider: beyond what is reached."""
     return [_within(robot, name, beyond(ends), most) for name, ends in ranges.items()]
 
 
 def farthest(robot: Robot, strokes: list[tuple[float, float] | None]) -> float:
-    """How far sliders lead from home, mm: where no stroke ends that, to the farthest base joint."""
+    """Return the largest way from home, mm: where no stroke ends it, to the farthest base joint."""
     units = robot.actuator_units
     if all(stroke or unit == "rad" for stroke, unit in zip(strokes, units, strict=True)):
         return np.inf
@@ -71,7 +71,7 @@ def actuators(
     strokes: list[tuple[float, float] | None],
     ranges: dict[str, tuple[float, float]],
 ) -> list[list[float]]:
-    """From where to where each actuator goes: its stroke, or what the poses ask for."""
+    """Return the range of each actuator: its stroke, or what the poses ask for."""
     at = robot.inverse(robot.home)
     corners = np.repeat(robot.home[None], 2 * len(ranges), axis=0)
     for k, (name, ends) in enumerate(ranges.items()):

@@ -15,7 +15,7 @@ _SLIDES = 0.3  # of the arm's length
 
 
 def data(arm: SerialArm) -> dict[str, Any]:
-    """All that the page needs of an arm, as JSON has it; mm and rad."""
+    """Return the page's data of an arm as JSON has it; mm and rad."""
     given, arm = arm, arm.rigid
     turning = np.array([unit == "rad" for unit in arm.actuator_units])
     limits = arm.limits()

@@ -32,12 +32,12 @@ class Skeleton:
 
     @property
     def joints(self) -> FloatArray:
-        """All joints, in the same order for the same machine."""
+        """Return the joints, in the same order for the same machine."""
         return np.concatenate([*self.limbs, self.platform])
 
 
 def skeleton(robot: Robot | SerialArm, q: FloatArray, guess: FloatArray) -> Skeleton | None:
-    """Where a machine's joints are at actuator coordinates (n,); None where it has no pose.
+    """Return a machine's joints at actuator coordinates (n,); None where it has no pose.
 
     Parameters
     ----------

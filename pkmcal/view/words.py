@@ -1,4 +1,4 @@
-"""What a page says of a machine: what its limbs are, and in which way it moves."""
+"""Words of a page on a machine: its limbs, and the ways in which it moves."""
 
 from __future__ import annotations
 

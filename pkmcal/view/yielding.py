@@ -1,4 +1,4 @@
-"""How stiff a machine is, as data for its page."""
+"""Stiffness of a machine, as data for its page."""
 
 from __future__ import annotations
 

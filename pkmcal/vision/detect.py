@@ -37,7 +37,7 @@ _TILTED = np.radians(5.0)  # between pictures, of a board that is tilted enough 
 
 @dataclass(frozen=True, repr=False)
 class Detection(Result):
-    """What of a board pictures show.
+    """Corners of a board in pictures.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class Detection(Result):
 
     @property
     def image(self) -> IntArray:
-        """Which of `taken` each corner is in, (N,)."""
+        """Picture of each corner, as a place in `taken`, (N,)."""
         return np.repeat(np.arange(len(self.taken)), [len(each.seen.ids) for each in self.taken])
 
     @property
@@ -75,7 +75,7 @@ class Detection(Result):
 
     @property
     def pixel(self) -> FloatArray:
-        """Where it is, (N, 2), px."""
+        """Place of each corner, (N, 2), px."""
         return np.concatenate([np.empty((0, 2)), *(each.seen.pixel for each in self.taken)])
 
     def write(
@@ -198,7 +198,7 @@ def detect(
 
 
 def _remarks(found: Detection, board: Board, tilts: FloatArray, finds: Finder) -> Iterator[str]:
-    """What should be known of all pictures together."""
+    """List remarks on all pictures together."""
     if not found.taken:
         if _seen_in_a_mirror(found.pictures, finds):
             yield (
@@ -241,7 +241,7 @@ def _area(pixel: FloatArray) -> float:
 
 
 def _seen_in_a_mirror(pictures: Sequence[Picture], finds: Finder) -> bool:
-    """Whether the first picture that shows no board shows one from behind."""
+    """Return whether the first picture that shows no board shows one from behind."""
     for each in pictures:
         if each.bad.startswith("no board"):
             levels = grey(each.path, each.path.read_bytes())

@@ -26,7 +26,7 @@ _PUPIL = (1, 0, 3, 2)  # its order of a tag's corners, as a tag of OpenCV is dra
 
 
 class Seen(NamedTuple):
-    """What of a board is in a picture.
+    """Corners of a board in one picture.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ def opencv() -> Any:
 
 
 def finder(board: Board) -> Finder:
-    """What finds the corners of a board in a picture, an array (height, width) of grey levels.
+    """Return a detector of corners for a picture (height, width) of grey levels.
 
     Raises
     ------
@@ -237,7 +237,7 @@ def _centres_of_squares(columns: int, rows: int) -> tuple[FloatArray, Any]:
 
 
 def _is_turned(grey: Any, board: Board, pixel: FloatArray, cells: tuple[FloatArray, Any]) -> bool:
-    """Whether what should be black squares is lighter than the others: turned by 180 degrees."""
+    """Return whether the black squares are lighter than the others: turned by 180 degrees."""
     cv2, (centres, black) = opencv(), cells
     plane = (board.places / board.sizes[0])[:, None, :2]
     to_pixel = cv2.findHomography(plane, pixel[:, None])[0]

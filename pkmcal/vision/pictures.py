@@ -26,7 +26,7 @@ _BLURRED = 1 / 3  # of the median contrast of other pictures
 
 
 class Picture(NamedTuple):
-    """One picture and what is in it.
+    """A picture and its corners.
 
     Attributes
     ----------
@@ -104,7 +104,7 @@ def looked_at(path: Path, grey: Any, finds: Finder) -> Picture:
 
 
 def _contrast(grey: Any, pixel: FloatArray) -> float:
-    """How much grey levels differ from pixel to pixel next to corners, the median of the most."""
+    """Return the contrast next to corners, pixel to pixel, the median of the largest."""
     height, width = grey.shape
     steepest = []
     for u, v in pixel.round().astype(int):

@@ -1,4 +1,4 @@
-"""One picture of all pictures, with what was found in them."""
+"""A contact sheet of all pictures, with the corners that were found."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _MOST = 40  # numbers in a panel
 
 
 class Panel(NamedTuple):
-    """One of the pictures.
+    """A picture on the sheet.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class Panel(NamedTuple):
 
 
 def draw(panels: Sequence[Panel]) -> bytes:
-    """All of them side by side, in rows, as a PNG file."""
+    """Draw the pictures side by side, in rows, as a PNG file."""
     cv2 = opencv()
     drawn = [_drawn(panel) for panel in panels]
     height = max(len(each) for each in drawn)

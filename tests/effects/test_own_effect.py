@@ -255,6 +255,10 @@ def test_numbers_of_one_role_that_are_not_alike_are_refused(
 
 
 def test_what_is_no_effect_is_named(machine: tuple[pk.Robot, pk.Robot, FloatArray]) -> None:
+    class Still(Sinking):
+        def of_rows(self, measured: Any) -> Any:
+            return len(measured)
+
     class Half:
         name = "half"
 
@@ -267,6 +271,7 @@ def test_what_is_no_effect_is_named(machine: tuple[pk.Robot, pk.Robot, FloatArra
         (Sinking, r"the class Sinking; an object of it is needed: Sinking\(…\)"),
         ([Sinking], "the class Sinking"),
         (Half(), "an object of class Half has no dependences"),
+        (Still(), "of_rows of Still must return an object with a method moved, .* found int"),
         (7, "expected such as"),
         (pk.readings.Position(), "expected such as"),
         ([7], "expected such as"),

@@ -1,6 +1,6 @@
 """Damaged inputs at every door: refused in the package's words, or taken and usable.
 
-A short run; ``python -m tests.fuzz`` makes long ones, and docs/reliability.md has their figures.
+A short run; ``python -m tests.fuzz`` makes long ones, and benchmarks/recorded/ has their figures.
 """
 
 from __future__ import annotations

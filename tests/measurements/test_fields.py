@@ -65,6 +65,20 @@ def test_a_field_that_declares_its_unit_alone_is_read_back(
     np.testing.assert_array_equal(found, given)
 
 
+def test_a_unit_of_ones_own_and_an_empty_cell_are_named(tmp_path: Path) -> None:
+    one = Field()
+    one.name, one.unit = "draught", "m/s"
+    path = tmp_path / "m.csv"
+    for text, message in (
+        ("draught [knots]\n1\n", r"unit \[knots\]: expected one of m/s"),
+        ("draught\n1\n", r"has no unit: expected 'draught \[m/s\]' \(or another of m/s\)"),
+        ("x,draught [m/s]\n1,2\n1,\n", "line 3"),
+    ):
+        path.write_text(text)
+        with pytest.raises(pk.FileError, match=message):
+            one.read(Table(path), Position(), ("mm",))
+
+
 def test_a_field_that_writes_columns_of_its_own_has_to_read_them() -> None:
     with pytest.raises(TypeError, match="Lost: has columns of its own, and no method read"):
 

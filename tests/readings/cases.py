@@ -1,7 +1,13 @@
-"""A case for every registered kind of reading, and for readings outside of the package."""
+"""A case for every registered kind of reading, and for readings outside of the package.
+
+``READING=mine.py pytest tests/readings`` also tries a kind of one's own: the file's `CASE` is a
+mapping of the arguments of `Case`.
+"""
 
 from __future__ import annotations
 
+import os
+import runpy
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
@@ -147,3 +153,11 @@ CASES = (
     Case("loop", at_poses(lambda n: Loop(runs(n))), TIP, {"target": "unknown"}, own=Loop()),
     Case("spot", at_poses(lambda _: Spot()), TIP, own=Spot()),
 )
+
+
+def with_that_of(file: str | None, cases: tuple[Case, ...] = CASES) -> tuple[Case, ...]:
+    """The cases, and that of a file."""
+    return (*cases, Case(**runpy.run_path(file)["CASE"])) if file else cases
+
+
+EVERY = with_that_of(os.environ.get("READING"))

@@ -16,18 +16,18 @@ from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.free_parameters import parameters
 from pkmcal.estimation.parameters import Asked
 from pkmcal.estimation.starts import with_starts
-from pkmcal.readings import At, Predicted
-from pkmcal.readings.registry import KINDS
+from pkmcal.readings import At, Predicted, always
+from pkmcal.readings.registry import KINDS, require_own_columns
 
 from ..simulated import with_errors
-from .cases import CASES, NOISE, Case
-from .own import Spot
+from .cases import CASES, EVERY, NOISE, Case, with_that_of
+from .own import Loop, Spot
 
 SIGMA = 0.5  # mm; errors of the machine
 
-EVERY = pytest.mark.parametrize("case", CASES, ids=[case.name for case in CASES])
+CASE = pytest.mark.parametrize("case", EVERY, ids=[case.name for case in EVERY])
 READING = pytest.mark.parametrize(
-    "case", [c for c in CASES if c.name != "closure"], ids=lambda case: case.name
+    "case", [c for c in EVERY if c.name != "closure"], ids=lambda case: case.name
 )
 
 
@@ -63,7 +63,7 @@ def test_derivatives_are_those_of_differences(case: Case, unknown: bool) -> None
     np.testing.assert_allclose(jacobian * chosen.scale, expected, rtol=0, atol=atol)
 
 
-@EVERY
+@CASE
 def test_columns_are_read_back_to_the_last_bit(case: Case, tmp_path: Path) -> None:
     measured = case.measured(pk.load(case.machine), 7, 3, NOISE)
     measured.write(tmp_path / "m.csv")
@@ -77,7 +77,7 @@ def test_columns_are_read_back_to_the_last_bit(case: Case, tmp_path: Path) -> No
     assert str(again) == str(measured)
 
 
-@EVERY
+@CASE
 def test_rows_take_what_the_instrument_has_of_them_along(case: Case) -> None:
     measured = case.measured(pk.load(case.machine), 7, 3, NOISE)
     rows = [5, 2]
@@ -89,7 +89,7 @@ def test_rows_take_what_the_instrument_has_of_them_along(case: Case) -> None:
             np.testing.assert_array_equal(own, whole[rows])
 
 
-@EVERY
+@CASE
 def test_what_a_simulation_was_told_is_not_in_its_measurements(case: Case) -> None:
     measured = case.measured(pk.load(case.machine), 7, 3, NOISE)
     plain = {f.name: f.default for f in dataclasses.fields(measured.instrument)}
@@ -194,3 +194,101 @@ def test_only_an_object_of_a_class_of_ones_own_is_taken_for_a_file(tmp_path: Pat
     for wrong in ("height", Spot):
         with pytest.raises(pk.ArgumentTypeError, match=r"^kind must be a Reading"):
             pk.read_measurements(tmp_path / "m.csv", kind=wrong)  # type: ignore[arg-type]
+
+
+OWN = """
+from dataclasses import dataclass
+import pkmcal as pk
+from pkmcal.readings import Position, Reading
+
+@dataclass(frozen=True, eq=False)
+class Sideways(Reading):
+    name, components = "sideways", (("across", "mm"), ("along", "mm"), ("up", "mm"))
+
+    def predict(self, at, **numbers):
+        return Position().predict(at)
+
+def draw(robot, rows, rng):
+    return robot.inverse(pk.sample_poses(robot, rows, seed=int(rng.integers(99)))), Sideways()
+
+CASE = {"name": "sideways", "draw": draw, "own": Sideways(), "target": None}
+"""
+
+
+def test_a_kind_of_ones_own_is_tried_from_its_file(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(OWN)
+    *_, case = with_that_of(str(tmp_path / "mine.py"))
+    assert case.name == "sideways"
+    test_columns_are_read_back_to_the_last_bit(case, tmp_path)
+    test_derivatives_are_those_of_differences(case, False)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class String(Loop):
+    """A string of which something is left out of the class or wrong."""
+
+    wrong: str = ""
+
+    name = "string"
+
+    def predict(self, at: At, **numbers: Any) -> Any:  # type: ignore[override]
+        found = super().predict(at, **numbers)
+        return (found.values, found.by_twist) if self.wrong == "predict" else found
+
+    def dependences(self, data: Any) -> Any:
+        names = self.loop[:1] if self.wrong == "names" else self.loop
+        yield always("zero", "loop", (("zero", "mm"),), list(names), data.starts)
+
+    def starts(self, machine: Any, sets: Any, found: Any) -> None:
+        if self.wrong != "starts":
+            super().starts(machine, sets, found)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ("predict", r"predict of 'string' must return Predicted\(…\); found tuple"),
+        ("names", "zero: the dependence on it has 1 names .* each of 20 rows"),
+        ("starts", r"zero: the search for loop 'A' has no start: .* found\['loop', 'A'\]"),
+    ],
+)
+def test_what_a_class_of_ones_own_leaves_out_is_named(wrong: str, message: str) -> None:
+    robot = pk.load("hexapod")
+    q = robot.inverse(pk.sample_poses(robot, 20, seed=1))
+    with pytest.raises(pk.ArgumentError, match=message):
+        measured = pk.VirtualMachine(robot, NOISE).measure(q, String(["A", "B"] * 10, wrong))
+        pk.identify(robot, measured, "offset*")
+
+
+def test_starts_that_need_poses_and_do_not_say_so_are_named() -> None:
+    class Forgot(String):
+        starts_by_pose = False
+
+    robot = pk.load("hexapod")
+    q = robot.inverse(pk.sample_poses(robot, 20, seed=1))
+    measured = pk.VirtualMachine(robot, NOISE).measure(q, Forgot(["A"] * 20))
+    with pytest.raises(pk.ArgumentError, match=r"starts of 'string' .* starts_by_pose = True"):
+        pk.identify(robot, measured, "offset*")
+
+
+def test_a_class_without_name_or_components_or_with_those_of_other_columns_is_named() -> None:
+    wrong: dict[str, tuple[dict[str, Any], str]] = {
+        "name": ({"name": ""}, "Wrong has to state its name"),
+        "components": ({"components": ()}, r"Wrong has to state its components .* found \(\)"),
+        "pairs": ({"components": ("mm",)}, "Wrong has to state its components"),
+        "time": ({"components": (("time", "s"),)}, "Wrong calls a column 'time'"),
+        "q1": ({"components": (("q1", "mm"),)}, "Wrong calls a column 'q1'"),
+        "label": ({"components": (("l", "mm"),), "labels": ("session",)}, "a column 'session'"),
+    }
+    for members, message in wrong.values():
+        reading = type("Wrong", (Loop,), {"name": "wrong", **members})(["A"] * 3)
+        with pytest.raises((pk.ArgumentError, pk.ArgumentTypeError), match=message):
+            pk.Measurements(np.ones((3, 6)), np.ones(3), reading)
+
+
+def test_two_kinds_that_would_read_the_same_columns_are_refused() -> None:
+    loop = Loop()
+    other = type("Other", (Loop,), {"name": "other"})()
+    with pytest.raises(TypeError, match="loop and other both read the columns length, loop"):
+        require_own_columns((*KINDS.values(), loop, other))
+    require_own_columns((*KINDS.values(), loop))
