@@ -89,10 +89,15 @@ int CALL(pose_normals)(ptrdiff_t n, int unknowns, const int64_t *first, const in
                        const double *residual, const double *by_unknown, double *matrix,
                        double *pull, double *cost, double *work);
 
-/* These, and damping (n) of each pose -> the step (n, unknowns), what it should take off rᵀr (n), rᵀr
- * itself (n), and what is left of the residual as of a column of `part` below. A step that gains less
- * than `least` of rᵀr, or no more than errors `rounding` of the unknowns make of it, is 0 and gains 0;
- * of a pose with numbers that are not finite it is 0 and gains NaN. */
+/* by_unknown -> R of its QR factorisation (n, unknowns, unknowns), behind as many rows as a pose has
+ * equations zeros. */
+int CALL(pose_triangle)(ptrdiff_t n, int unknowns, const int64_t *first, const int64_t *order,
+                        const double *by_unknown, double *factor, double *work);
+
+/* residual, by_unknown, and damping (n) of each pose -> the step (n, unknowns), what it should take off
+ * rᵀr (n), rᵀr itself (n), and what is left of the residual as of a column of `part` below. A step that
+ * gains less than `least` of rᵀr, or no more than errors `rounding` of the unknowns make of it, is 0 and
+ * gains 0; of a pose with numbers that are not finite it is 0 and gains NaN. */
 int CALL(pose_fit)(ptrdiff_t n, int unknowns, const int64_t *first, const int64_t *order,
                    const double *residual, const double *by_unknown, const double *damping,
                    double least, double rounding, const int64_t *place, double *step, double *gain,

@@ -149,6 +149,26 @@ INLINE real triangle(ptrdiff_t u, const double *vectors, const double *diagonal,
     return a == b ? at(diagonal, a) : at(vectors, a * u + b);
 }
 
+int CALL(pose_triangle)(ptrdiff_t n, int unknowns, const int64_t *first, const int64_t *order,
+                        const double *by_unknown, double *factor, double *work)
+{
+    const ptrdiff_t u = unknowns;
+    double *diagonal = work, *vectors = work + LANES * u;
+    for (ptrdiff_t start = 0; start < n; start += LANES) {
+        ptrdiff_t row[LANES];
+        const int count = block_rows(start, n, row);
+        const pose_equations of = equations_of(row, first, order);
+        mirrors(&of, u, by_unknown, vectors, diagonal);
+        for (ptrdiff_t a = 0; a < u; a++)
+            for (ptrdiff_t b = 0; b < u; b++) {
+                const int there = a <= b && a < of.most;
+                const real x = there ? triangle(u, vectors, diagonal, a, b) : fill(0.0);
+                scatter(owned(&of, a, x), factor + a * u + b, u * u, row, count);
+            }
+    }
+    return 0;
+}
+
 int CALL(pose_fit)(ptrdiff_t n, int unknowns, const int64_t *first, const int64_t *order,
                    const double *residual, const double *by_unknown, const double *damping,
                    double least, double rounding, const int64_t *place, double *step, double *gain,

@@ -22,7 +22,7 @@ from pkmcal.exceptions import ArgumentError
 from pkmcal.files.atomic import write_whole
 from pkmcal.jobs.machine import is_built_in
 from pkmcal.jobs.project import Project
-from pkmcal.jobs.reading import board_file
+from pkmcal.jobs.reading import is_file
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -234,11 +234,12 @@ def named(project: Project) -> list[str]:
     """Return the files that a project names, the machine's first."""
     job, plan, importing = project.calibration, project.plan, project.importing
     reading = job.reading
-    boards = (board_file(reading.board), board_file(plan.board))
+    board = plan.board if plan.board is not None and is_file(plan.board) else None
     configuration = (importing.file, importing.log) if importing else ()
     machine = None if is_built_in(job.robot) else job.robot
-    read = (reading.controller, reading.columns, reading.camera, job.held_file)
-    others = (*read, *boards, plan.poses, plan.targets, plan.camera)
+    seen = (*reading.lens_files, *reading.board_files)
+    read = (reading.controller, reading.columns, job.held_file)
+    others = (*read, *seen, board, plan.poses, plan.targets, plan.camera)
     return [name for name in (machine, *configuration, *job.files, *others) if name]
 
 

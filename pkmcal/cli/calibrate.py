@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from pkmcal.calibration.identification import Identification
-from pkmcal.cli.camera_options import BoardSeen, BoardSize, CameraOn, Lens, LensFound
+from pkmcal.cli.camera_options import BoardSize, BoardsSeen, CameraOn, Lenses, LensFound
 from pkmcal.cli.measured import (
     Columns,
     Controller,
@@ -222,9 +222,9 @@ def calibrate(
     rotation: Rotation = None,
     invert_poses: InvertPoses = False,
     probe_offset: ProbeOffset = None,
-    camera: Lens = None,
+    camera: Lenses = None,
     camera_on: CameraOn = "base",
-    board: BoardSeen = None,
+    board: BoardsSeen = None,
     out: Annotated[
         Path | None,
         typer.Option(

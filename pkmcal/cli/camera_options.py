@@ -18,6 +18,16 @@ Lens = Annotated[
         help="Of pixels u and v: the lens, a YAML or JSON file of OpenCV or camera_info of ROS.",
     ),
 ]
+Lenses = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--camera",
+        rich_help_panel=READING,
+        metavar="FILE",
+        help="Of pixels u and v: the lens, a YAML or JSON file of OpenCV or camera_info of ROS. Of"
+        " several cameras NAME=FILE each, as the column camera has them; repeatable.",
+    ),
+]
 CameraOn = Annotated[
     str,
     typer.Option(
@@ -35,6 +45,18 @@ BoardSeen = Annotated[
         help="What it sees, on the other: charuco:8x6,20,15,5X5_100 (squares, side and marker mm,"
         " dictionary), chessboard:10x7,20 (inner corners), apriltags:6x4,30,9,APRILTAG_36h11"
         " (tag and gap), or a CSV file of corner, x, y, z.",
+    ),
+]
+BoardsSeen = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--board",
+        rich_help_panel=READING,
+        metavar="BOARD",
+        help="What it sees, on the other: charuco:8x6,20,15,5X5_100 (squares, side and marker mm,"
+        " dictionary), chessboard:10x7,20 (inner corners), apriltags:6x4,30,9,APRILTAG_36h11"
+        " (tag and gap), or a CSV file of corner, x, y, z. Of several boards NAME=BOARD each, as"
+        " the column board has them; repeatable.",
     ),
 ]
 LensFound = Annotated[

@@ -12,6 +12,7 @@ from pkmcal.cli.output import say
 from pkmcal.cli.progress import progress
 from pkmcal.jobs.inputs import Inputs
 from pkmcal.jobs.output import Output
+from pkmcal.jobs.reading import named
 from pkmcal.readings.boards import Board
 from pkmcal.readings.camera import Camera
 from pkmcal.report.as_json import as_json
@@ -28,13 +29,17 @@ def detect(
         typer.Option(
             metavar="BOARD",
             help="What they show, as for calibrate: charuco:8x6,20,15,5X5_100, chessboard:10x7,20,"
-            " apriltags:6x4,30,9,APRILTAG_36h11 or circles:10x7,25.",
+            " apriltags:6x4,30,9,APRILTAG_36h11 or circles:10x7,25. NAME=BOARD writes a column"
+            " board, for calibrations with several.",
         ),
     ],
     camera: Annotated[
-        Path | None,
+        str | None,
         typer.Option(
-            "--camera", metavar="FILE", help="The lens, by which pictures are judged; not needed."
+            "--camera",
+            metavar="FILE",
+            help="The lens, by which pictures are judged; not needed. NAME=FILE, or NAME= alone,"
+            " writes a column camera, for calibrations with several.",
         ),
     ] = None,
     out: Annotated[
@@ -58,14 +63,16 @@ def detect(
 
     read = Inputs()
     output = Output(out, [PIXELS, SHEET], read, force)
-    lens = None if camera is None else Camera.from_file(camera)
-    seen = Board.parse(board)
+    of_camera, file = named(camera or "")
+    of_board, which = named(board)
+    lens = Camera.from_file(file) if file else None
+    seen = Board.parse(which)
     with progress("looking for boards") as step:
         found = find(images, seen, lens, step)
     written: list[Path] = []
     if found.taken:
         with output.draft() as draft:
-            found.write(draft / PIXELS)
+            found.write(draft / PIXELS, camera=of_camera, board=of_board)
             found.draw(draft / SHEET)
         written = output.paths
     if json:

@@ -98,6 +98,18 @@ class PoseEquations:
         call("pose_normals", *given, *found, self._work(), isa=self._isa)
         return found
 
+    def triangle(self, rows: FloatArray) -> FloatArray:
+        """R (K, u, u) of a QR factorisation of the rows (E, u) of each pose.
+
+        Squares and products of its columns are those of all rows. Zeros follow where a pose has
+        fewer than u.
+        """
+        n, u = self._poses, self.unknowns
+        found = np.empty((n, u, u))
+        given = n, u, self._first, self.order, np.ascontiguousarray(rows)
+        call("pose_triangle", *given, found, self._work(), isa=self._isa)
+        return found
+
     def fit(
         self,
         residual: FloatArray,

@@ -101,7 +101,8 @@ def _median(data: FitData, parameters: Parameters) -> float:
     read = np.isfinite(data.measured.values.reshape(start.residuals[0].shape)).any(axis=1)
     whole = of_read(data.measured, start.residuals[0])
     length = parameters.robot.length
-    off = data.measured.instrument.distance_per_point(whole, data.measured, length)[read]
+    mm = data.measured.instrument.mm(data.measured, length)
+    off = np.linalg.norm(whole * mm, axis=1)[read]
     return float(np.median(np.where(np.isfinite(off), off, np.inf))) if read.any() else np.inf
 
 

@@ -102,7 +102,7 @@ def _shrunk(given: Measurements, other: Measurements) -> float:
 
 def _misfits(residual: FloatArray, measured: Measurements, size: float) -> FloatArray:
     """Residual of each row, mm; angles as their arc. NaN if the row is not reached."""
-    off: FloatArray = measured.instrument.distance_per_point(residual, measured, size)
+    off: FloatArray = np.linalg.norm(residual * measured.instrument.mm(measured, size), axis=1)
     return off
 
 

@@ -23,7 +23,7 @@ def begun(
     exact = equations.with_exact_actuators()
     start = start_in_modes(exact)
     _, own = equations.begin(start)
-    better = in_least_minima(equations.with_parameters(start.parameters), own)
+    better = in_least_minima(equations.with_parameters(start.parameters).fewest, own)
     if better is not own:
         start = exact.start(states=better.onward)
     equations = equations.with_parameters(start.parameters)

@@ -56,10 +56,26 @@ def as_fit_data(
         raise ArgumentError("measurements: state actuator_sigma of all sets, or of none")
     if any(data.unknown_frame for data in datasets) and not any(data.framed for data in datasets):
         raise ArgumentError("frame: distances do not depend on it, it cannot be unknown")
+    _require_one_frame(datasets)
     distances = any(data.measured.instrument.point == "base" for data in datasets)
     if any(data.unknown_attachment for data in datasets) and not distances:
         raise ArgumentError("attachment: distances alone have one, it cannot be unknown")
     return with_starts(robot, datasets)
+
+
+def _require_one_frame(datasets: Sequence[FitData]) -> None:
+    """Refuse readings of different things that would share a frame."""
+    stands = dict[tuple[str, str], str]()
+    for data in datasets:
+        if data.frame is None:
+            continue
+        own = data.measured.instrument.stands_by
+        if stands.setdefault(data.frame, own) != own:
+            one, other = (each or "another instrument" for each in (stands[data.frame], own))
+            raise ArgumentError(
+                f"measurements: {one} and {other} stand each in a place of its own: name the"
+                " camera, or the board that stands (camera_name, board_name)"
+            )
 
 
 def informative(machine: Calibratable, datasets: list[FitData]) -> tuple[list[FitData], int]:

@@ -16,6 +16,7 @@ import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray
 from pkmcal.core.library import STATUS
+from pkmcal.estimation.compression import compressed
 from pkmcal.estimation.elimination import Shares
 from pkmcal.estimation.evaluation import Cache, Evaluation
 from pkmcal.estimation.first_frames import aligned
@@ -57,6 +58,8 @@ class Equations:
         Which equations count together.
     without_slack : ndarray (K, n)
         What the actuators would read if no cable were slack.
+    whole : Equations or None
+        Those that these are compressed of.
     """
 
     missing: int
@@ -65,6 +68,7 @@ class Equations:
     machines: Machines
     blocks: RowBlocks
     without_slack: FloatArray
+    whole: Equations | None = None
 
     @classmethod
     def of(cls, datasets: Sequence[FitData], parameters: Parameters, missing: int = 0) -> Equations:
@@ -102,6 +106,12 @@ class Equations:
         """Factors that turn the residuals of the components (k,) of each set into mm."""
         return tuple(m.instrument.arcs(m, self.parameters.robot.length) for m in self.table.sets)
 
+    @cached_property
+    def mm(self) -> tuple[FloatArray, ...]:
+        """One unit of each component of each set in mm, (k,) or (N, k)."""
+        length = self.parameters.robot.length
+        return tuple(m.instrument.mm(m, length) for m in self.table.sets)
+
     @property
     def size(self) -> float:
         """The largest number that the equations are made of, mm."""
@@ -132,6 +142,43 @@ class Equations:
         if not isinstance(self.blocks, PoseBlocks):
             return None
         return PoseSystem(self.prediction, self.whitening, self.blocks)
+
+    @cached_property
+    def compressed(self) -> Equations | None:
+        """Fewer equations of the same squares; None where there are none.
+
+        What they have at an evaluation is what these have but for rounding: squares, derivatives
+        by the parameters and their products, degrees of freedom. Of rows by themselves they say
+        nothing.
+        """
+        found = None if self.whole is not None else compressed(self.prediction, self.whitening)
+        if found is None:
+            return None
+        prediction, whitening, beyond_rows = found
+        table, unstated = prediction.table, self.blocks.unstated
+        if isinstance(self.blocks, PoseBlocks):
+            slack = self.blocks.slack
+            blocks: RowBlocks = pose_blocks(table, self.machines, slack, unstated, self.size)
+            if not np.array_equal(blocks.pose_of_block, self.blocks.pose_of_block):
+                return None
+        else:
+            blocks = row_blocks(table, unstated, self.missing)
+        beyond = np.zeros((len(blocks.components), len(unstated)), dtype=np.intp)
+        counts = blocks.block_of_row >= 0
+        place = blocks.block_of_row[counts], table.set_of[counts]
+        np.add.at(beyond, place, beyond_rows[counts])
+        return replace(
+            self,
+            prediction=prediction,
+            whitening=whitening,
+            blocks=replace(blocks, beyond=beyond),
+            whole=self,
+        )
+
+    @property
+    def fewest(self) -> Equations:
+        """These equations compressed, if they can be."""
+        return self.compressed or self
 
     # other equations ------------------------------------------------------------------------------
 
@@ -212,11 +259,19 @@ class Equations:
             self.parameters,
             machines,
             states,
-            tuple(each.values for each in predicted),
+            self.prediction.of_rows(predicted),
             self.prediction.residuals(predicted),
             self._begun(near),
             cache,
         )
+
+    def kept(self, evaluation: Evaluation) -> Evaluation:
+        """An evaluation by other equations of the same rows, as by these."""
+        cache = Cache()
+        if len(self.table.rows) <= _TOGETHER:
+            predicted = self.prediction.at(evaluation.pose, evaluation.theta)
+            cache["predicted"] = self.prediction, predicted
+        return replace(evaluation, cache=cache)
 
     def start(
         self,
@@ -252,7 +307,7 @@ class Equations:
         # closures that contradict each other may still have a best pose
         lost = np.flatnonzero(start.status)
         near = start.states.at_poses(lost, self.parameters.robot.home)
-        return equations, equations.at(start.theta, near=near)
+        return equations, equations.fewest.at(start.theta, near=near)
 
     def squares_ahead(self, theta: FloatArray, noise: FloatArray, near: Near) -> float:
         """Sum of the squared equations where poses with unknowns are looked for, none fitted."""
@@ -295,7 +350,7 @@ class Equations:
         """Measured less predicted (M,), whitened and reduced."""
         if self.system is not None:
             return -self.system.at(evaluation, noise)[2]
-        return self.whitening.whitened(evaluation.residuals, noise)
+        return self.whitening.whitened(self.prediction.misfits(evaluation), noise)
 
     def by_parameters(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
         """Derivative (M, n) of what is predicted by the parameters, whitened and reduced."""
@@ -338,14 +393,21 @@ class Equations:
         its equation. `weights` are those of the blocks (B,).
         """
         if self.system is not None:
-            return self.system.by_groups(evaluation, noise, weights, residual, leverage)
-        count = len(self.blocks.unstated)
-        group = np.repeat(self.blocks.family_of_block, self.blocks.components)
-        every = np.repeat(weights, self.blocks.components)
-        free = every - np.einsum("ij,ij->i", leverage, leverage)
-        freedom = np.bincount(group, free, count).astype(np.float64)
-        squares = np.bincount(group, residual**2, count).astype(np.float64)
-        return squares, freedom, np.diag(freedom)
+            squares, freedom, information = self.system.by_groups(
+                evaluation, noise, weights, residual, leverage
+            )
+        else:
+            count = len(self.blocks.unstated)
+            group = np.repeat(self.blocks.family_of_block, self.blocks.components)
+            every = np.repeat(weights, self.blocks.components)
+            free = every - np.einsum("ij,ij->i", leverage, leverage)
+            freedom = np.bincount(group, free, count).astype(np.float64)
+            squares = np.bincount(group, residual**2, count).astype(np.float64)
+            information = np.diag(freedom)
+        if (beyond := self.blocks.beyond) is not None:
+            freedom = freedom + weights @ beyond
+            information = information + np.diag(weights**2 @ beyond)
+        return squares, freedom, information
 
     def failures(self, evaluation: Evaluation) -> str:
         """Say which rows failed and why; empty where the forward kinematics solved all."""

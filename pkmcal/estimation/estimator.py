@@ -79,6 +79,9 @@ class Estimator:
 
         The search begins at `near`, or else at the start.
         """
+        compressed = self._compressed()
+        if compressed is not None:
+            return self._of_compressed(compressed.solve(near))
         size = self.start.robot.length
         noise, freedom, known = self._first_noise()
         state = self._state(noise, self._first_loss(), size, known=known)
@@ -131,11 +134,39 @@ class Estimator:
         self.search.end(trail)
         return estimate
 
+    def _compressed(self) -> Estimator | None:
+        """The estimator by fewer equations, with which all is as with these; None: there is none.
+
+        Not where a robust loss weighs rows of a lot one by one.
+        """
+        fewer = self.equations.compressed
+        by_rows = self.loss != "linear" and not self.equations.machines.unknowns
+        return None if fewer is None or by_rows else Estimator(fewer, self.start, self.loss)
+
+    def _of_compressed(self, found: Estimate) -> Estimate:
+        """The estimate by all equations where that by fewer ones has come to."""
+        blocks, state = self.equations.blocks, found.state
+        width, weights = state.loss.width, found.weights
+        if not self.equations.machines.unknowns:  # rows, not poses
+            width = weights = np.ones(len(blocks.components))
+        loss = Loss(state.loss.name, blocks.components, width)
+        evaluation = self.equations.kept(found.evaluation)
+        design = self.search.own_jacobian(evaluation, state.noise)
+        multiply_in_place(design, found.basis)
+        return replace(
+            found,
+            evaluation=evaluation,
+            state=replace(state, loss=loss),
+            residual=self.equations.residual(evaluation, state.noise),
+            design=design,
+            weights=weights,
+        )
+
     # between the least squares ------------------------------------------------------------------
 
     def _loss(self, name: LossName, width: FloatArray) -> Loss:
-        of_units = width[self.equations.blocks.family_of_block]
-        return Loss(name, self.equations.blocks.components, of_units)
+        blocks = self.equations.blocks
+        return Loss(name, blocks.components, width[blocks.family_of_block], blocks.stands_for)
 
     def _first_noise(self) -> tuple[FloatArray, FloatArray | None, Known | None]:
         """1 mm where it is not stated; with a prior what the data alone show at the start.
@@ -195,11 +226,9 @@ class Estimator:
 
     def _medians(self, residual: FloatArray) -> FloatArray:
         """Variance (F,) that whitened residuals (M,) of each family show by their median."""
-        squares, components = (
-            self.equations.blocks.squares(residual),
-            self.equations.blocks.components,
-        )
-        family_of = self.equations.blocks.family_of_block
+        blocks = self.equations.blocks
+        squares, components = blocks.squares(residual), blocks.stands_for
+        family_of = blocks.family_of_block
         return np.array([
             median_ratio(squares[family_of == f], components[family_of == f])
             for f in range(int(family_of.max()) + 1)
@@ -334,7 +363,7 @@ class Estimator:
             variance = together = float(squares[mine].sum()) / left
             if medians is not None:
                 of_family = self.equations.blocks.family_of_block == f
-                count = float(self.equations.blocks.components[of_family].sum())
+                count = float(self.equations.blocks.stands_for[of_family].sum())
                 variance = float(medians[f]) * count / left
             of_families[f] = np.sqrt(variance)
             known = mine[self.unstated[mine] & (freedom[mine] >= self.least_freedom)]
@@ -372,8 +401,9 @@ class Estimator:
         Where poses have unknowns it is that of what is left of all equations, whitened as stated.
         """
         if self.equations.machines.unknowns:
-            return self.search.triangle(evaluation, np.ones(len(self.unstated)))
-        arcs = [m.instrument.mm(m, self.start.robot.length) for m in self.equations.table.sets]
+            fewest = Search(self.equations.fewest, self.start)
+            return fewest.triangle(evaluation, np.ones(len(self.unstated)))
+        arcs = self.equations.mm
         factor = np.zeros((0, len(self.scale)))
         for _, parts in self.equations.prediction.derivatives(evaluation):
             for i, rows, part in parts:

@@ -157,6 +157,16 @@ def _seen(
     return pose
 
 
+def _read(prediction: Prediction, evaluation: Evaluation, i: int, rows: IntArray) -> FloatArray:
+    """What rows of set `i` read (N, k); of readings that depend on a tool its pose."""
+    m = prediction.table.sets[i]
+    if "tool" not in prediction.columns[i]:
+        return m.values[rows]
+    at = evaluation.pose[prediction.table.pose_of[i]]
+    seen: FloatArray = m.instrument.places_seen(m, at)[rows]
+    return seen
+
+
 def _aligned(
     prediction: Prediction,
     evaluation: Evaluation,
@@ -174,7 +184,7 @@ def _aligned(
     places, turns = (np.concatenate(each) for each in zip(*parts, strict=True))
     frame, shifts = instrument.frame(
         Sighting(
-            values=np.concatenate([prediction.table.sets[i].values[rows[i]] for i in mine]),
+            values=np.concatenate([_read(prediction, evaluation, i, rows[i]) for i in mine]),
             predicted=np.concatenate(
                 [_seen(prediction, evaluation, i, rows[i], parameters, theta) for i in mine]
             ),

@@ -14,7 +14,9 @@ from pkmcal.exceptions import ArgumentError
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.readings.unknowns import PLACE, Dependence, Numbers, Start, points_of
 
-__all__ = ["PLACE", "Dependence", "FitData", "Numbers", "Start", "points_of"]
+FRAME = "frame"  # the role of frames
+
+__all__ = ["FRAME", "PLACE", "Dependence", "FitData", "Numbers", "Start", "points_of"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +57,11 @@ class FitData:
         """True if these readings depend on the unknown frame."""
         instrument = self.measured.instrument
         return bool(instrument.framed and (self.unknown_frame or not instrument.placed))
+
+    @property
+    def frame(self) -> tuple[str, str] | None:
+        """Role and name of the unknown frame that these readings are in; None: of none."""
+        return (FRAME, self.measured.instrument.frame_name) if self.framed else None
 
     @property
     def axis(self) -> IntArray | None:

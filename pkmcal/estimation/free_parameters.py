@@ -14,7 +14,7 @@ import numpy as np
 
 from pkmcal.arguments import did_you_mean, shown
 from pkmcal.arrays import FloatArray
-from pkmcal.estimation.fit_data import PLACE, FitData, Numbers
+from pkmcal.estimation.fit_data import FRAME, PLACE, FitData, Numbers
 from pkmcal.estimation.own_residuals import (
     ROLE,
     Residual,
@@ -22,7 +22,7 @@ from pkmcal.estimation.own_residuals import (
     brought_numbers,
     residual_name,
 )
-from pkmcal.estimation.parameters import FRAME, Asked, Bounds, Parameters
+from pkmcal.estimation.parameters import Asked, Bounds, Parameters
 from pkmcal.estimation.prior_functions import is_function, prior_functions
 from pkmcal.estimation.scales import unit_scales
 from pkmcal.estimation.sessions import Scope, label, matches, scopes
@@ -208,11 +208,13 @@ def _without_exact(
 
 
 def _beside_geometry(datasets: Sequence[FitData]) -> dict[tuple[str, str], Numbers]:
-    """The numbers to be found beside the geometry, by role and name: the frame comes first."""
+    """The numbers to be found beside the geometry, by role and name: frames come first."""
     found: dict[tuple[str, str], Numbers] = {}
-    if any(data.framed for data in datasets):
-        names, units = zip(*((f"frame.{axis}", unit) for axis, unit in PLACE), strict=True)
-        found[FRAME] = Numbers(names, units, np.arange(6), np.zeros(6))
+    for frame in (data.frame for data in datasets):
+        if frame is not None:
+            whose = ".".join(filter(None, frame))
+            names, units = zip(*((f"{whose}.{axis}", unit) for axis, unit in PLACE), strict=True)
+            found[frame] = Numbers(names, units, np.arange(6), np.zeros(6))
     for dependence in (each for data in datasets for each in data.dependences()):
         role = dependence.role
         for name, own in dependence.estimated.items():
@@ -300,9 +302,9 @@ def _entries(
 
 
 def _where_read(data: FitData, point: tuple[str, str]) -> tuple[str, ...]:
-    """The sessions in which a set has readings of a point, or in the unknown frame."""
-    if point == FRAME:
-        return (data.measured.sessions or ("",)) if data.framed else ()
+    """The sessions in which a set has readings of a point, or in a frame."""
+    if point[0] == FRAME:
+        return (data.measured.sessions or ("",)) if data.frame == point else ()
     role, name = point
     for each in data.dependences():
         if each.role == role and name in each.estimated:

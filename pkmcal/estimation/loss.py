@@ -41,15 +41,19 @@ class Loss:
         Equations of each row.
     width : ndarray (N,)
         Factor on the limit c of each row.
+    stands_for : ndarray of int (N,), optional
+        How many equations each counts as, k: more than it has where they are compressed.
     """
 
     name: LossName
     components: IntArray
     width: FloatArray
+    stands_for: IntArray | None = None
 
     def of(self, units: slice) -> Loss:
         """Return the loss for some of the rows."""
-        return Loss(self.name, self.components[units], self.width[units])
+        many = None if self.stands_for is None else self.stands_for[units]
+        return Loss(self.name, self.components[units], self.width[units], many)
 
     def _lengths(self, residual: FloatArray) -> FloatArray:
         first = np.cumsum(self.components) - self.components
@@ -58,7 +62,8 @@ class Loss:
 
     @property
     def _limit(self) -> FloatArray:
-        limit: FloatArray = LIMITS[self.name] * np.sqrt(self.components) * self.width
+        many = self.components if self.stands_for is None else self.stands_for
+        limit: FloatArray = LIMITS[self.name] * np.sqrt(many) * self.width
         return limit
 
     def weights(self, residual: FloatArray) -> FloatArray:

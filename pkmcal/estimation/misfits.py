@@ -19,14 +19,14 @@ def worst_readings(equations: Equations, pose: FloatArray, theta: FloatArray) ->
     Angles count as their arc. NaN where nothing was read.
     """
     worst = np.full(len(pose), np.nan)
-    prediction, length = equations.prediction, equations.parameters.robot.length
+    prediction = equations.prediction
     residuals = prediction.residuals(prediction.at(pose, theta))
-    for m, place, residual in zip(
-        equations.table.sets, equations.table.pose_of, residuals, strict=True
+    for m, mm, place, residual in zip(
+        equations.table.sets, equations.mm, equations.table.pose_of, residuals, strict=True
     ):
         read = np.isfinite(m.values.reshape(residual.shape))
         known = np.where(read, residual, 0.0)
-        off = np.linalg.norm(known * m.instrument.mm(m, length), axis=1)
+        off = np.linalg.norm(known * mm, axis=1)
         off = np.where(np.isfinite(off), off, np.inf)
         some = read.any(axis=1)
         np.fmax.at(worst, place[some], off[some])
@@ -35,9 +35,10 @@ def worst_readings(equations: Equations, pose: FloatArray, theta: FloatArray) ->
 
 def distances(equations: Equations, evaluation: Evaluation) -> FloatArray:
     """Return distances of the measured points, mm, in the order of the sets."""
+    whole = equations.whole or equations
     return np.concatenate([
-        m.instrument.distance_per_point(of_read(m, r), m, equations.parameters.robot.length)
-        for m, r in zip(equations.table.sets, evaluation.residuals, strict=True)
+        np.linalg.norm(of_read(m, r) * mm if m.components else of_read(m, r), axis=1)
+        for m, mm, r in zip(whole.table.sets, whole.mm, evaluation.residuals, strict=True)
     ])  # fmt: skip
 
 
@@ -94,6 +95,7 @@ def _closures_off(system: PoseSystem, evaluation: Evaluation) -> FloatArray:
 
 def rounding(equations: Equations, noise: FloatArray) -> float:
     """Length of the whitened rounding errors of what is predicted, for noise (G,)."""
+    equations = equations.whole or equations
     length, readings, sigma = equations.parameters.robot.length, 0.0, equations.machines.sigma
     if equations.system is None or equations.whitening.any_read:
         parts = [rounding_of(m, length) for m in equations.table.sets]

@@ -15,7 +15,7 @@ import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.core.poses import compose, compose_rates
-from pkmcal.estimation.fit_data import Dependence, FitData
+from pkmcal.estimation.fit_data import FRAME, Dependence, FitData
 from pkmcal.estimation.own_residuals import Residual, at_parameters, residual_name
 from pkmcal.estimation.prior_functions import PriorFunction
 from pkmcal.estimation.sessions import NONE, Scope, label
@@ -29,7 +29,6 @@ Prior = float | Mapping[str, float | tuple[float, float]] | None
 Known = Literal["known", "unknown"]
 KNOWN: tuple[Known, ...] = ("known", "unknown")
 Bounds = Mapping[str, tuple[float, float]] | None
-FRAME = ("frame", "")  # role and name of the unknown frame
 
 
 @dataclass(frozen=True)
@@ -100,7 +99,7 @@ class Parameters:
         Places in the geometry's values of the first numbers.
     nuisance : mapping of (str, str) to int
         First number of what is found beside the geometry, by role (`Dependence.role`) and name:
-        of the frame (`FRAME`), each point, zero or artefact.
+        of each frame (`FitData.frame`), point, zero or artefact.
     origin : mapping
         Where the six parameters of a frame or tool count from, by the first: the base in the
         instrument's frame, or the tool on the platform, is at this pose (6,) followed by them. Near
@@ -226,11 +225,6 @@ class Parameters:
         return smoothness_rows(self.robot, self.places, columns, len(self))
 
     @property
-    def frame(self) -> int | None:
-        """Number of frame.x; None where the frame is known."""
-        return self.nuisance.get(FRAME)
-
-    @property
     def geometry(self) -> slice:
         """The parameters that are of the geometry: the first ones."""
         return slice(0, int(np.count_nonzero(self.number_of < len(self.places))))
@@ -238,7 +232,7 @@ class Parameters:
     @property
     def motions(self) -> tuple[int, ...]:
         """The first parameter of each frame and each tool."""
-        numbers = [at for key, at in self.nuisance.items() if key == FRAME or key[0] == "tool"]
+        numbers = [at for (role, _), at in self.nuisance.items() if role in (FRAME, "tool")]
         return tuple(np.flatnonzero(np.isin(self.number_of, numbers)).tolist())
 
     def columns_of(self, datasets: Sequence[FitData]) -> tuple[IntArray, tuple[IntArray, ...]]:

@@ -35,7 +35,7 @@ def solved_in_least_minima(estimator: Estimator) -> Estimate:
     estimate = estimator.solve()
     for _ in range(_ROUNDS):
         noise = estimate.state.noise
-        better = in_least_minima(estimator.equations, estimate.evaluation, noise)
+        better = in_least_minima(estimator.equations.fewest, estimate.evaluation, noise)
         if better is estimate.evaluation:
             break
         estimate = estimator.solve(better)
@@ -87,7 +87,7 @@ def squares_of_poses(equations: Equations, evaluation: Evaluation, noise: FloatA
 def _freedom(equations: Equations) -> IntArray:
     """Equations of each pose (K,) beyond those that determine it."""
     blocks = equations.blocks
-    count = np.bincount(blocks.pose_of_block, blocks.components, len(equations.table.actuators))
+    count = np.bincount(blocks.pose_of_block, blocks.stands_for, len(equations.table.actuators))
     return count.astype(np.intp)
 
 

@@ -52,15 +52,15 @@ class PoseSystem:
             return equation, by_unknown
         twists = machines.twists(states)
         predicted = self.prediction.at(states.pose, theta)
-        residuals = self.prediction.residuals(predicted)
+        misfits = self.prediction.misfits_of(predicted)
         by_pose = [
-            m.instrument.by_difference(chained(each.by_twist, twists, place), residual)
-            for m, each, place, residual in zip(
-                table.sets, predicted, table.pose_of, residuals, strict=True
+            m.instrument.by_difference(chained(each.by_twist, twists, place), misfit)
+            for m, each, place, misfit in zip(
+                table.sets, predicted, table.pose_of, misfits, strict=True
             )
         ]
         return (
-            np.concatenate([equation, -self.whitening.whitened(residuals, noise)]),
+            np.concatenate([equation, -self.whitening.whitened(misfits, noise)]),
             np.concatenate([by_unknown, self.whitening.whitened(by_pose, noise)]),
         )
 

@@ -98,8 +98,9 @@ class Prediction:
         """Rows of each set that are in each frame, by its first parameter."""
         found: RowsOfSets = {}
         for i, (data, part) in enumerate(zip(self.datasets, self.table.part_of, strict=True)):
-            if self.parameters.frame is not None and data.framed:
-                _collect(found, i, self.table.columns[part, self.parameters.frame])
+            if data.frame is not None:
+                number = self.parameters.nuisance[data.frame]
+                _collect(found, i, self.table.columns[part, number])
         return found
 
     @cached_property
@@ -153,53 +154,78 @@ class Prediction:
         for name, columns in self.columns[i].items():
             found[name] = np.where(columns == NONE, found[name], theta[columns])
         if "tool" in self.columns[i]:
-            first = self.columns[i]["tool"][:, 0].tolist()
-            found["tool_origin"] = np.array([self.parameters.origin[column] for column in first])
+            first, tool = np.unique(self.columns[i]["tool"][:, 0], return_inverse=True)
+            origins = [self.parameters.origin[column] for column in first.tolist()]
+            found["tool_origin"] = np.array(origins)[tool.reshape(-1)]
         return found
 
     def at(self, pose: FloatArray, theta: FloatArray) -> tuple[Predicted, ...]:
         """Predict the readings of each set at poses (K, 6), with their derivatives."""
-        found = []
-        for i, m in enumerate(self.table.sets):
-            if not m.components:
-                found.append(Predicted(np.empty((len(m), 0)), np.empty((len(m), 0, 6))))
-                continue
-            alone = self._by_geometry_alone(i, pose, theta)
-            require_predicted(m.kind, len(m.components), len(m), alone)
-            moved = self._moved(i, alone, pose, theta)
-            require_derivatives(m.instrument, moved, self.numbers[i])
-            found.append(moved)
-        return tuple(found)
+        return tuple(self.of_set(i, pose, theta) for i in range(len(self.table.sets)))
+
+    def of_set(self, i: int, pose: FloatArray, theta: FloatArray) -> Predicted:
+        """Predict the readings of a set at poses (K, 6), with their derivatives."""
+        m = self.table.sets[i]
+        if not m.components:
+            return Predicted(np.empty((len(m), 0)), np.empty((len(m), 0, 6)))
+        alone = self._by_geometry_alone(i, pose, theta)
+        require_predicted(m.kind, len(m.components), len(m), alone)
+        moved = self._moved(i, alone, pose, theta)
+        require_derivatives(m.instrument, moved, self.numbers[i])
+        return moved
+
+    def of_rows(self, predicted: Sequence[Predicted]) -> tuple[FloatArray, ...]:
+        """Return the predicted values of the rows (N, k) of each set."""
+        return tuple(each.values for each in predicted)
 
     def residuals(self, predicted: Sequence[Predicted]) -> tuple[FloatArray, ...]:
-        """Measured less predicted of each set."""
-        return tuple(
-            measured.instrument.difference(measured.values, each.values)
-            for measured, each in zip(self.table.sets, predicted, strict=True)
-        )
+        """Measured less predicted of the rows of each set."""
+        return tuple(self.residual(i, each) for i, each in enumerate(predicted))
 
-    def _by_geometry_alone(self, i: int, pose: FloatArray, theta: FloatArray) -> Predicted:
-        data, reading = self.datasets[i], self.table.sets[i].instrument
+    def residual(self, i: int, predicted: Predicted) -> FloatArray:
+        """Measured less predicted (N, k) of a set."""
+        measured = self.table.sets[i]
+        return measured.instrument.difference(measured.values, predicted.values)
+
+    def misfits_of(self, predicted: Sequence[Predicted]) -> tuple[FloatArray, ...]:
+        """Return the misfits of the equations of each set, not whitened: the residuals."""
+        return self.residuals(predicted)
+
+    def misfits(self, evaluation: Evaluation) -> tuple[FloatArray, ...]:
+        """Return `misfits_of` at an evaluation."""
+        return evaluation.residuals
+
+    def rows_in_frames(self, i: int) -> list[IntArray]:
+        """Rows of a set in each frame; all of them where it has none."""
+        found = [of_sets[i] for of_sets in self.frames.values() if i in of_sets]
+        return found or [np.arange(len(self.table.pose_of[i]))]
+
+    def in_frames(
+        self, i: int, pose: FloatArray, theta: FloatArray
+    ) -> Iterator[tuple[At, dict[str, FloatArray], IntArray]]:
+        """Iterate over the frames of a set: place, arguments of `predict`, rows of each."""
+        data = self.datasets[i]
         numbers, at = self.arguments_of(i, theta), self._place(i, pose, theta)
         for effect in data.effects:
             for each in effect.dependences(data.measured):
                 del numbers[each.argument]
         frames = [(first, of_sets[i]) for first, of_sets in self.frames.items() if i in of_sets]
         if not frames:
-            return reading.predict(at, **numbers)
+            yield at, numbers, np.arange(len(at.pose))
+        for first, rows in frames:
+            every = len(rows) == len(at.pose)
+            own = numbers if every else {name: number[rows] for name, number in numbers.items()}
+            frame, origin = theta[first : first + 6], self.parameters.origin[first]
+            place = at.pose if every else at.pose[rows]
+            yield replace(at, pose=place, frame=frame, origin=origin), own, rows
+
+    def _by_geometry_alone(self, i: int, pose: FloatArray, theta: FloatArray) -> Predicted:
+        reading = self.table.sets[i].instrument
         parts = [
-            reading.predict(
-                replace(
-                    at,
-                    pose=at.pose[rows],
-                    frame=theta[first : first + 6],
-                    origin=self.parameters.origin[first],
-                ),
-                **{name: number[rows] for name, number in numbers.items()},
-            )
-            for first, rows in frames
+            (reading.predict(at, **numbers), rows)
+            for at, numbers, rows in self.in_frames(i, pose, theta)
         ]
-        return joined(parts, [rows for _, rows in frames])
+        return joined(*map(list, zip(*parts, strict=True)))
 
     def _moved(
         self, i: int, predicted: Predicted, pose: FloatArray, theta: FloatArray
@@ -270,12 +296,8 @@ class Prediction:
         """
         table, count, size = self.table, len(self.table.rows), len(self.parameters)
         predicted, machines = self.predicted(evaluation), evaluation.machines
-        direct = [
-            m.instrument.by_geometry(
-                self._place(i, evaluation.pose, evaluation.theta), self.parameters.places
-            )
-            for i, m in enumerate(table.sets)
-        ]
+        direct = [self.by_geometry(i, evaluation) for i in range(len(table.sets))]
+        misfits = self.misfits(evaluation)
         place = np.full(len(evaluation.pose), NONE)
         for batch in lots(count, count if machines.unknowns else _BATCH):
             some = list(self._in_sets(batch))
@@ -295,9 +317,14 @@ class Prediction:
             for (i, rows), part in zip(some, parts, strict=True):
                 self._add_direct(part, i, rows, predicted[i], direct[i])
                 wide = by_parameters(part, table.columns, table.part_of[i][rows], size)
-                read, residual = table.sets[i].instrument, evaluation.residuals[i][rows]
+                read, residual = table.sets[i].instrument, misfits[i][rows]
                 found.append((i, rows, read.by_difference(wide, residual)))
             yield batch, found
+
+    def by_geometry(self, i: int, evaluation: Evaluation) -> FloatArray | None:
+        """Derivative (N, k, g) of a set to numbers of the geometry at held poses; None: it is 0."""
+        at = self._place(i, evaluation.pose, evaluation.theta)
+        return self.table.sets[i].instrument.by_geometry(at, self.parameters.places)
 
     def jacobian(self, evaluation: Evaluation) -> list[FloatArray]:
         """Derivative of the predicted values of each set to the parameters, (N, k, n).
@@ -305,7 +332,7 @@ class Prediction:
         With the opposite sign that of the residuals.
         """
         n = len(self.parameters)
-        found = [np.empty((*each.shape, n)) for each in evaluation.residuals]
+        found = [np.empty((*each.shape, n)) for each in self.misfits(evaluation)]
         for _, parts in self.derivatives(evaluation):
             for i, rows, part in parts:
                 found[i][rows] = part
@@ -315,10 +342,11 @@ class Prediction:
         self, part: FloatArray, i: int, rows: slice, seen: Predicted, direct: FloatArray | None
     ) -> None:
         """Add how readings follow numbers beside the pose to their derivatives (b, k, m)."""
-        places, frame = self.parameters.places, self.parameters.frame
+        places, named = self.parameters.places, self.datasets[i].frame
         if direct is not None:
             part[:, :, : len(places)] += direct[rows]
-        if seen.by_frame is not None and frame is not None:
+        if seen.by_frame is not None and named is not None:
+            frame = self.parameters.nuisance[named]
             part[:, :, frame : frame + 6] = seen.by_frame[rows]
         for name, numbers in self.numbers[i].items():
             own = numbers[rows]
@@ -328,8 +356,8 @@ class Prediction:
     def _in_sets(self, batch: slice) -> Iterator[tuple[int, slice]]:
         """Rows of each set that has some of these, which count through all sets."""
         first = 0
-        for i, measured in enumerate(self.table.sets):
-            last = first + len(measured)
+        for i, place in enumerate(self.table.pose_of):
+            last = first + len(place)
             if batch.start < last and first < batch.stop:
                 yield i, slice(max(batch.start - first, 0), min(batch.stop, last) - first)
             first = last

@@ -6,7 +6,7 @@ it is all that was read at one pose, less the equations that determine that pose
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -38,6 +38,9 @@ class RowBlocks:
     uninformative : int
         How many rows or poses have no equation: nothing was read, or all that was read determines
         the pose.
+    beyond : ndarray of int (B, G) or None
+        How many more equations of each group a block has which are 0 whatever the parameters are;
+        None: none has any.
     """
 
     components: IntArray
@@ -46,6 +49,15 @@ class RowBlocks:
     family_of_block: IntArray
     unstated: BoolArray
     uninformative: int
+    beyond: IntArray | None = field(default=None, kw_only=True)
+
+    @cached_property
+    def stands_for(self) -> IntArray:
+        """Number of equations that each block (B,) stands for: its own, and those beyond."""
+        if self.beyond is None:
+            return self.components
+        many: IntArray = self.components + self.beyond.sum(axis=1)
+        return many
 
     @property
     def family_of_group(self) -> IntArray:

@@ -125,6 +125,11 @@ class Whitening:
         self._whiten(part, i, rows, noise)
         return self.stacked(part, i, rows)
 
+    def whiten_alone(self, part: FloatArray, i: int) -> FloatArray:
+        """Whiten all numbers (N, k, ...) of set `i` as they are stated, in their memory."""
+        self._whiten(part, i, slice(None), np.ones(len(self.white)))
+        return part
+
     def stacked(self, part: FloatArray, i: int, rows: slice) -> FloatArray:
         """The numbers that were read of a part (b, k, ...) of some rows of set `i`, stacked."""
         flat = part.reshape(-1, *part.shape[2:])

@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from pkmcal.arguments import word
 from pkmcal.arms.arm import SerialArm
@@ -30,7 +30,7 @@ from pkmcal.jobs.geometry_options import (
     read_uncertainty,
 )
 from pkmcal.jobs.inputs import Inputs
-from pkmcal.jobs.read_files import read_file, rows_to_drop, without_lines
+from pkmcal.jobs.read_files import read_files, rows_to_drop, without_lines
 from pkmcal.jobs.sessions import in_sessions
 from pkmcal.kinematics.calibratable import Calibratable, as_machine
 from pkmcal.kinematics.robot import Robot
@@ -41,6 +41,7 @@ from pkmcal.readings.unknowns import POINT
 from pkmcal.statistics.covariance import RULES
 
 Tell = Callable[[str], object]  # takes a line on what was assumed
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,9 @@ class Sources:
     robot : Robot or SerialArm
         The machine.
     measured : tuple of Measurements
-        Those of each file.
+        Those of each file; of a file with several cameras or boards those of each.
+    file_of : tuple of int
+        Which file each is of.
     held : Measurements or None
         Those of a file that is held out.
     doubts : tuple of str
@@ -61,6 +64,7 @@ class Sources:
 
     robot: Robot | SerialArm
     measured: tuple[Measurements, ...]
+    file_of: tuple[int, ...]
     held: Measurements | None
     doubts: tuple[str, ...]
 
@@ -87,14 +91,22 @@ def read(job: Calibration, inputs: Inputs, tell: Tell) -> Sources:
     machine = as_machine(robot)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", CalibrationWarning)
-        measured = [read_file(path, machine, job.reading, inputs, tell) for path in job.files]
+        several = [read_files(path, machine, job.reading, inputs, tell) for path in job.files]
     doubts = tuple(str(each.message) for each in caught)
     for doubt in doubts:
         tell(doubt)
     held = None
     if job.held_file is not None:
-        held = read_file(job.held_file, machine, job.reading, inputs, tell)
-    return Sources(robot, tuple(measured), held, doubts)
+        found = read_files(job.held_file, machine, job.reading, inputs, tell)
+        if len(found) > 1:
+            raise ArgumentError(
+                f"--holdout {job.held_file}: it has several cameras or boards; hold out a share, as"
+                " --holdout 0.2, or a file of one"
+            )
+        held = found[0]
+    measured = tuple(each for of_file in several for each in of_file)
+    file_of = tuple(k for k, of_file in enumerate(several) for _ in of_file)
+    return Sources(robot, measured, file_of, held, doubts)
 
 
 def identified(sources: Sources, arguments: dict[str, Any]) -> Identification:
@@ -124,7 +136,7 @@ def arguments(job: Calibration, sources: Sources, tell: Tell) -> dict[str, Any]:
         "free": free,
         "prior": read_prior(job.prior, machine, free or ()),
         "loss": words["loss"] if words["rule"] == "auto" else tuple(words.values()),
-        "unknown": _unknown(job, measured),
+        "unknown": _unknown(job, sources),
         "holdout": held,
         "per_session": _anew(job),
         "fix": fixed,
@@ -147,15 +159,16 @@ def _rows(
         measured = [_approached(job.approach, each) for each in measured]
         held = _approached(job.approach, held) if isinstance(held, Measurements) else held
     if job.session or _anew(job):
-        files = [Path(each) for each in job.files]
-        measured, held = in_sessions(files, measured, job.session, job.holdout, held)
+        files = [Path(job.files[k]) for k in sources.file_of]
+        named = _for_sets("--session", job.session, job, sources) if job.session else ()
+        measured, held = in_sessions(files, measured, named, job.holdout, held)
     if job.tracker is not None:
         tracker = read_tracker(job.tracker)
         measured = [_seen_by(tracker, each) for each in measured]
-    named: Sequence[str] = job.drop
+    dropping: Sequence[str] = job.drop
     if isinstance(held, Measurements):
-        named, held = without_lines(named, held, measured, tell)
-    dropped: list[int | Found] = [*rows_to_drop(named, measured)]
+        dropping, held = without_lines(dropping, held, measured, tell)
+    dropped: list[int | Found] = [*rows_to_drop(dropping, measured)]
     found: dict[Found, bool] = {"outliers": job.drop_outliers, "slack": job.drop_slack}
     return measured, held, [*dropped, *(each for each, asked in found.items() if asked)]
 
@@ -188,21 +201,27 @@ def _anew(job: Calibration) -> list[str]:
     return [name.strip() for text in job.per_session for name in text.split(",")]
 
 
-def _unknown(job: Calibration, measured: Sequence[Measurements]) -> dict[Role, Known | list[Known]]:
+def _unknown(job: Calibration, sources: Sources) -> dict[Role, Known | list[Known]]:
     """Return the unknowns by ``--frame``, ``--target`` and ``--attachment``, for each file."""
     return {
-        "frame": _known("--frame", job.frame, measured),
-        "target": _known("--target", job.target, measured),
-        "attachment": _known("--attachment", job.attachment, measured),
+        "frame": _known("--frame", job.frame, job, sources),
+        "target": _known("--target", job.target, job, sources),
+        "attachment": _known("--attachment", job.attachment, job, sources),
     }
 
 
-def _known(option: str, text: str, measured: Sequence[Measurements]) -> Known | list[Known]:
+def _known(option: str, text: str, job: Calibration, sources: Sources) -> Known | list[Known]:
     """Return words, one for all files or one for each."""
     words = [word(option, part.strip(), KNOWN) for part in text.split(",")]
-    if len(words) not in (1, len(measured)):
-        raise ArgumentError(f"{option} {text}: {len(words)} words for {len(measured)} files")
-    return words[0] if len(words) == 1 else words
+    return words[0] if len(words) == 1 else _for_sets(option, words, job, sources)
+
+
+def _for_sets(option: str, given: Sequence[T], job: Calibration, sources: Sources) -> list[T]:
+    """Return the words of each file, for each set of measurements."""
+    if len(given) != len(job.files):
+        what = "names" if option == "--session" else "words"
+        raise ArgumentError(f"{option}: {len(given)} {what} for {len(job.files)} files")
+    return [given[k] for k in sources.file_of]
 
 
 def read_tracker(text: str) -> Tracker:

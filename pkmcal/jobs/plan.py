@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from pkmcal.jobs.machine import OfMachine
-from pkmcal.jobs.reading import board_file
+from pkmcal.jobs.reading import is_file
 from pkmcal.jobs.stated import PathText, below, command
 
 
@@ -57,5 +57,7 @@ class Planning(OfMachine):
     def in_folder(self, folder: str) -> Planning:
         """Return the job with its relative paths, those of a project file, below a folder."""
         found = super().in_folder(folder)
-        board = board_file(self.board)
-        return found if board is None else replace(found, board=below(folder, board))
+        board = self.board
+        if board is None or not is_file(board):
+            return found
+        return replace(found, board=below(folder, board))

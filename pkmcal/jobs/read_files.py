@@ -10,23 +10,55 @@ import numpy as np
 
 from pkmcal.arguments import word
 from pkmcal.exceptions import ArgumentError, FileError
+from pkmcal.files.csv_table import Table as CsvTable
 from pkmcal.files.number_text import typed
 from pkmcal.files.reading import MOST_ROBOT
 from pkmcal.files.toml_lines import Source
 from pkmcal.files.toml_table import Table
 from pkmcal.jobs.inputs import Inputs
-from pkmcal.jobs.reading import Reading
+from pkmcal.jobs.reading import Reading, named
 from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.measurements.measurement_csv import read_measurements
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.readings.boards import Board
-from pkmcal.readings.camera import Camera, Found, Mount
+from pkmcal.readings.camera import Camera, Mount
+from pkmcal.readings.lens import Found
 
 COLUMNS = ("header", "ignore", "rename", "units", "rotation")  # keys of a file of --columns
 
 
-def read_file(
+def read_files(
     path: str, robot: Calibratable, reading: Reading, inputs: Inputs, tell: Callable[[str], object]
+) -> list[Measurements]:
+    """Read the measurements of a file: of several cameras or boards those of each that it has.
+
+    What was assumed is told, a line each.
+    """
+    several = cameras(reading)
+    if len(several) < 2:
+        alone = several[0] if several else None
+        return [read_file(path, robot, reading, inputs, tell, alone)]
+    seen = _named_in(path, reading, inputs)
+    found = [
+        read_file(path, robot, reading, inputs, tell, each)
+        for each in several
+        if not seen or (each.camera_name, each.board_name) in seen
+    ]
+    if not found or not seen:
+        raise ArgumentError(
+            f"{path}: of several cameras or boards it has to name that of each row, in columns"
+            " camera and board"
+        )
+    return found
+
+
+def read_file(
+    path: str,
+    robot: Calibratable,
+    reading: Reading,
+    inputs: Inputs,
+    tell: Callable[[str], object],
+    camera: Camera | None = None,
 ) -> Measurements:
     """Read the measurements of a file; what was assumed is told, a line each."""
     if Path(path).suffix.lower() in (".toml", ".urdf"):
@@ -44,31 +76,55 @@ def read_file(
         stated["probe_offset"] = _offset(reading.probe_offset)
     log = None if reading.controller is None else inputs.file(reading.controller)
     measured = read_measurements(
-        inputs.file(path), robot, controller=log, join=reading.join, kind=camera(reading), **stated
+        inputs.file(path), robot, controller=log, join=reading.join, kind=camera, **stated
     )
     for note in measured.notes:
         tell(note)
     return measured
 
 
-def camera(reading: Reading) -> Camera | None:
-    """The camera that is stated; None without a lens.
+def cameras(reading: Reading) -> list[Camera]:
+    """The cameras that are stated, each with each board; none without a lens.
 
     Raises
     ------
     ValueError
-        A word that is none, a board without a camera, a lens file that cannot be read.
+        A word that is none, a board without a camera, a lens file that cannot be read, several of
+        which one has no name.
     """
     chosen = word("--lens", reading.lens, get_args(Found))
     mount = word("--camera-on", reading.camera_on, get_args(Mount))
-    if reading.camera is None:
-        if reading.board is not None:
+    if not reading.camera:
+        if reading.board:
             raise ArgumentError("--board: it is what a camera sees; state its lens, --camera FILE")
-        return None
-    seen = None if reading.board is None else Board.parse(reading.board)
-    return Camera.from_file(
-        reading.camera, on=mount, board=seen, lens=chosen, find_size=reading.find_size
-    )
+        return []
+    for option, given in (("--camera", reading.camera), ("--board", reading.board)):
+        names = [name for name, _ in map(named, given)]
+        if len(given) > 1 and ("" in names or len({*names}) < len(names)):
+            raise ArgumentError(f"{option}: name each of several, {option} NAME=…, {option} NAME=…")
+    boards: list[tuple[str, Board | None]] = [("", None)]
+    if reading.board:
+        boards = [(name, Board.parse(text)) for name, text in map(named, reading.board)]
+    return [
+        Camera.from_file(
+            file, on=mount, board=board, lens=chosen, find_size=reading.find_size,
+            camera_name=name, board_name=of_board,
+        )
+        for name, file in map(named, reading.camera)
+        for of_board, board in boards
+    ]  # fmt: skip
+
+
+def _named_in(path: str, reading: Reading, inputs: Inputs) -> set[tuple[str, str]]:
+    """Cameras and boards of the rows of a file, "" where they have no name; none of no column."""
+    table = CsvTable(inputs.file(path))
+    names = {new.lower(): old for old, new in reading.names.items()}
+    columns = [
+        table.texts(column) if column in table.columns else ("",) * len(table)
+        for column in (names.get(word, word) for word in ("camera", "board"))
+    ]
+    found = {*zip(*columns, strict=True)}
+    return set() if found == {("", "")} else found
 
 
 def rows_to_drop(given: Sequence[str], measured: Sequence[Measurements]) -> list[int]:

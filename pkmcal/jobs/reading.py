@@ -30,8 +30,10 @@ class Reading(Stated):
         Units of columns without one, order of angles, the probe's place.
     invert_poses : bool
         Whether poses are those of the base.
-    camera, camera_on, board, lens, find_size
-        The lens file of a camera, what it is fixed to, what it sees, what is unknown of both.
+    camera, board : tuple of str
+        The lens file of a camera, and what it sees; of several each as "NAME=…".
+    camera_on, lens, find_size
+        What cameras are fixed to, what is unknown of them and of boards.
 
     Examples
     --------
@@ -55,9 +57,9 @@ class Reading(Stated):
     rotation: str | None = None
     probe_offset: str | None = None
     invert_poses: bool = False
-    camera: PathText | None = None
+    camera: tuple[str, ...] = ()
     camera_on: str = "base"
-    board: str | None = None
+    board: tuple[str, ...] = ()
     lens: str = "none"
     find_size: bool = False
 
@@ -86,16 +88,37 @@ class Reading(Stated):
             table = {**table, "rename": [f"{old}={new}" for old, new in names.items()]}
         return super().values_of_table(table, refuse)
 
+    @property
+    def lens_files(self) -> tuple[str, ...]:
+        """Files of the lenses of all cameras."""
+        return tuple(file for _, file in map(named, self.camera))
+
+    @property
+    def board_files(self) -> tuple[str, ...]:
+        """Files of boards of one's own points."""
+        return tuple(board for _, board in map(named, self.board) if is_file(board))
+
     def in_folder(self, folder: str) -> Reading:
         """Return the options with their relative paths, those of a project file, below a folder."""
-        found = super().in_folder(folder)
-        board = board_file(self.board)
-        return found if board is None else replace(found, board=below(folder, board))
+
+        def there(text: str) -> str:
+            name, file = named(text)
+            return f"{name}={below(folder, file)}" if name else below(folder, file)
+
+        boards = tuple(there(each) if is_file(named(each)[1]) else each for each in self.board)
+        cameras = tuple(map(there, self.camera))
+        return replace(super().in_folder(folder), camera=cameras, board=boards)
 
 
-def board_file(board: str | None) -> str | None:
-    """The file of a board's own points; None of a board that words describe."""
-    return board if board is not None and board.lower().endswith(".csv") else None
+def named(text: str) -> tuple[str, str]:
+    """The name before an equals sign, "" where there is none, and what stands behind it."""
+    name, equals, what = text.partition("=")
+    return (name.strip(), what.strip()) if equals else ("", text)
+
+
+def is_file(board: str) -> bool:
+    """Tell a board that is a file of one's own points from a word that describes it."""
+    return board.lower().endswith(".csv")
 
 
 def _renamed(text: str) -> tuple[str, str]:

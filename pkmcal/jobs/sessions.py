@@ -24,21 +24,19 @@ def in_sessions(
     Parameters
     ----------
     files : sequence of Path
-        That were fitted.
+        The file of each set that is fitted.
     measured : sequence of Measurements
-        What they have.
+        The sets.
     named : sequence of str
-        What ``--session`` says, one name for each file, or nothing.
+        What ``--session`` says, one name for each, or nothing.
     holdout, held : str, Measurements
         The same of a file that is held out.
 
     Raises
     ------
     ValueError
-        Another number of names, or a name for a file that has a column session.
+        A name for a file that has a column session.
     """
-    if named and len(named) != len(files):
-        raise ArgumentError(f"--session: {len(named)} names for {len(files)} files")
     for path, each in zip(files, measured, strict=True):
         if named and each.session is not None:
             raise ArgumentError(f"--session: {path} has a column session")

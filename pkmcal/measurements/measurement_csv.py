@@ -204,6 +204,8 @@ def read_measurements(
     number_groups(table)
     if kind is not None:
         arguments.instance("kind", kind, Reading, ", an object of a class of your own")
+        if (own := kind.rows_of(table)) is not None:
+            table.take(own.tolist())
     readings = [*KINDS.values(), *(() if kind is None else (kind,))]
     points = {name for each in readings for name in each.own_points}
     several = several_targets(table, points)

@@ -85,6 +85,13 @@ def board_poses(
     return BoardPoses(pose, rms, possible)
 
 
+def facing(found: BoardPoses) -> FloatArray:
+    """Above 0 where a board is seen from the front (P,), its z pointing away from the camera."""
+    motion = screws.frames(np.ascontiguousarray(found.pose[:, 0]))
+    facing: FloatArray = (motion[:, :3, 2] * motion[:, :3, 3]).sum(axis=1)
+    return facing
+
+
 def unbent(pixel: FloatArray, lens: FloatArray) -> FloatArray:
     """Directions x/z, y/z (N, 2) of pixels (N, 2): the distortion undone; NaN where it folds."""
     bent = (pixel - lens[:, 2:4]) / lens[:, :2]
@@ -240,23 +247,25 @@ def _refined(
     """Places (P, 6) at which the squares of what corners are off are least, and their rms, px."""
     damping = np.full(len(pose), 1e-6)
     cost, normal, pull = _equations(pose, corner, pixel, lens, picture)
-    moving = np.isfinite(cost)
+    moving = np.flatnonzero(np.isfinite(cost))
     for _ in range(_STEPS):
-        diagonal = np.einsum("pii->pi", normal)
-        damped = normal + damping[:, None, None] * (np.eye(6) * diagonal[:, None])
-        damped[~moving] = np.eye(6)
-        step = np.where(moving[:, None], np.linalg.solve(damped, pull[:, :, None])[:, :, 0], 0.0)
-        trial = _moved(pose, step)
-        new = _equations(trial, corner, pixel, lens, picture)
-        better = moving & (new[0] <= cost)
-        pose[better] = trial[better]
-        for now, then in zip((cost, normal, pull), new, strict=True):
-            now[better] = then[better]
-        damping = np.where(better, damping * 0.1, damping * 10.0)
-        small = np.abs(step[:, :3]).max(axis=1) < _SMALL
-        moving &= ~(small | (damping > 1e12))
-        if not moving.any():
+        if not len(moving):
             break
+        own = normal[moving]
+        diagonal = np.einsum("pii->pi", own)
+        damped = own + damping[moving, None, None] * (np.eye(6) * diagonal[:, None])
+        step = np.linalg.solve(damped, pull[moving, :, None])[:, :, 0]
+        trial = _moved(pose[moving], step)
+        rows = np.flatnonzero(np.isin(picture, moving))
+        among = np.searchsorted(moving, picture[rows])
+        new = _equations(trial, corner[rows], pixel[rows], lens[rows], among)
+        better = new[0] <= cost[moving]
+        pose[moving[better]] = trial[better]
+        for now, then in zip((cost, normal, pull), new, strict=True):
+            now[moving[better]] = then[better]
+        damping[moving] *= np.where(better, 0.1, 10.0)
+        small = np.abs(step[:, :3]).max(axis=1) < _SMALL
+        moving = moving[~(small | (damping[moving] > 1e12))]
     count = np.bincount(picture, minlength=len(pose))
     return pose, np.sqrt(cost / count)
 

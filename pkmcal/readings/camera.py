@@ -11,8 +11,8 @@ scatter is then no noise of the corners, and is estimated beside it (`tells_actu
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
 from os import PathLike
 from typing import Any, ClassVar, Literal, get_args
 
@@ -20,37 +20,33 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal.arguments import word
-from pkmcal.arrays import FloatArray, IntArray, as_rows, chained, first_of_equal
+from pkmcal.arrays import FloatArray, IntArray, as_rows, first_of_equal
 from pkmcal.core import instruments, screws
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.csv_table import Table
 from pkmcal.readings import rows, twists
-from pkmcal.readings.board_poses import board_poses, mm_per_pixel, pictures_told, unbent
+from pkmcal.readings.alignment import Laid, Sighting, frame_of_poses
+from pkmcal.readings.board_poses import mm_per_pixel, pictures_told
 from pkmcal.readings.boards import Board
-from pkmcal.readings.lens_doubts import facing, lens_doubts
+from pkmcal.readings.lens import FOUND, LENS, Found, numbers_of_lens
+from pkmcal.readings.lens_doubts import lens_doubts
 from pkmcal.readings.lens_files import read_lens
 from pkmcal.readings.measured import InFit, Measured
-from pkmcal.readings.predicted import At, Predicted
+from pkmcal.readings.predicted import At, Lots, Predicted, Shared
 from pkmcal.readings.reading import Reading, Sets, Solve
-from pkmcal.readings.seen_places import disagreement, in_agreement
+from pkmcal.readings.seen_places import tool_places
 from pkmcal.readings.sight import visible
 from pkmcal.readings.unknowns import PLACE, Dependence, Numbers, Start, always
 from pkmcal.readings.unknowns import Found as Starts
 
 Mount = Literal["base", "platform"]
-Found = Literal["none", "focal", "all"]
-LENS = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
-_UNITS = ("px", "px", "px", "px", "1", "1", "1", "1", "1")
-_FOUND: Mapping[Found, tuple[int, ...]] = {
-    "none": (),
-    "focal": (0, 1, 2, 3),
-    "all": tuple(range(8)),
-}
 _NOWHERE = np.zeros(6)
 _NO_SIZE = np.zeros(1)
-_FEWEST = 4  # pictures, more of which tell that they are mirrored
-_OFF, _FALLS = 0.1, 3.0  # rad by which mirrored pictures are off, and how many times less mirrored
-_LEAST = 1e-9  # of what a number of the lens moves pixels by, where it moves none
+
+
+def _dotted(*words: str) -> str:
+    """Words that are not empty, with dots between."""
+    return ".".join(filter(None, words))
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +76,11 @@ class Camera(Reading):
         cx cy, "all" k1 k2 p1 p2 as well: ``lens.fx`` …. State a prior where it is known roughly.
     find_size : bool
         Whether the board may be larger than stated, by ``board.size`` (0.001: by 0.1 %).
+    camera_name, board_name : str
+        Which they are, where a calibration has several: the unknowns then are ``frame.left.x`` …,
+        ``tool.board.plate.x`` …, ``lens.left.fx`` … and ``board.plate.size`` of the camera "left"
+        and the board "plate". Each camera and board has measurements of its own; of a file with
+        columns ``camera`` and ``board`` their rows are read.
     stands, carried : (6,) array
         Of a simulated camera: the true ``frame`` and ``tool``.
 
@@ -115,6 +116,8 @@ class Camera(Reading):
     lens: Found = "none"
     find_size: bool = False
     board: Board | None = None
+    camera_name: str = ""
+    board_name: str = ""
     stands: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     carried: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -125,6 +128,7 @@ class Camera(Reading):
     tells_actuators: ClassVar[bool] = True
     scaled_by: ClassVar[str] = "board"
     frame_order: ClassVar[int] = 5
+    by_rows = ("lens", "size")
     own_points = ("corner",)
     truth = ("stands", "carried")
     stated = ("board",)
@@ -171,21 +175,50 @@ class Camera(Reading):
 
     # the model ------------------------------------------------------------------------------------
 
-    def predict(
+    @property
+    def frame_name(self) -> str:
+        """The name of what stands."""
+        return self.camera_name if self.on == "base" else self.board_name
+
+    @property
+    def stands_by(self) -> str:
+        """The camera or the board."""
+        return "board" if self._carried == "camera" else "camera"
+
+    def frame(self, seen: Sighting) -> Laid:
+        """The frame in which the tool is where pictures show it."""
+        return frame_of_poses(seen)
+
+    def predict(self, at: At, **numbers: FloatArray) -> Predicted:
+        """Pixels of corners with a board, or camera, at `tool` (N, 6) from `tool_origin` (N, 6)."""
+        places = [at.pose, *(numbers[name] for name in ("tool_origin", "tool") if name in numbers)]
+        shape = len(at.pose), 6
+        first = first_of_equal(np.hstack([np.broadcast_to(each, shape) for each in places]))
+        of = np.repeat(np.arange(len(first)), np.diff(first, append=len(at.pose)))
+        return self.shared(at, Lots(of, first), **numbers).of_rows()
+
+    def lots(self, m: Measured) -> IntArray:
+        """Pictures."""
+        return self._pictures(m)
+
+    def shared(
         self,
         at: At,
+        lots: Lots,
         tool: FloatArray = _NOWHERE,
         tool_origin: FloatArray = _NOWHERE,
         corner: FloatArray | None = None,
         lens: FloatArray | None = None,
         size: FloatArray = _NO_SIZE,
         **numbers: FloatArray,
-    ) -> Predicted:
-        """Pixels of corners with a board, or camera, at `tool` (N, 6) from `tool_origin` (N, 6)."""
+    ) -> Shared:
+        """Return `predict` through the motion of each picture's board before the camera."""
+        count = len(at.pose)
         frame = _NOWHERE if at.frame is None else at.frame
-        each = np.hstack(np.broadcast_arrays(at.pose, tool_origin, tool))
-        first = first_of_equal(each)
-        pose, origin, within = (np.ascontiguousarray(part) for part in np.split(each[first], 3, 1))
+        pose, origin, within = (
+            np.ascontiguousarray(np.broadcast_to(each, (count, 6))[lots.first])
+            for each in (at.pose, tool_origin, tool)
+        )
         outer, near = screws.frames(np.stack([at.origin, frame]))
         base = outer @ near
         to_mounting = base @ screws.frames(pose) @ screws.frames(origin)
@@ -193,29 +226,30 @@ class Camera(Reading):
         if self.on == "platform":
             board = np.linalg.inv(board)
             to_board = -twists.adjoint(board)
-        picture = np.repeat(np.arange(len(first)), np.diff(first, append=len(each)))
-        seen, by_twist, by_lens, by_size, depth = instruments.pixels(
-            screws.pose(np.ascontiguousarray(board).reshape(-1, 16))[picture],
-            self._corners(len(each)) if corner is None else corner,
+        seen, by_motion, by_lens, by_size, depth = instruments.pixels(
+            screws.pose(np.ascontiguousarray(board).reshape(-1, 16))[lots.of],
+            self._corners(count) if corner is None else corner,
             self.lens_numbers() if lens is None else lens,
             size,
         )
         seen[~(depth > 0)] = np.nan
         of_pose = twists.adjoint(base[None]) @ twists.at_base(pose)
         of_tool = twists.adjoint(to_mounting) @ twists.twists_of_numbers(within)
-        by = [of_pose, of_tool]
+        of_frame = None
         if at.frame is not None:
             of_frame = twists.adjoint(outer[None]) @ twists.twists_of_numbers(at.frame[None])
-            by.append(np.broadcast_to(of_frame, of_pose.shape))
-        by_all = np.concatenate(by, axis=2)
+            of_frame = np.broadcast_to(of_frame, of_pose.shape)
         if to_board is not None:
-            by_all = to_board @ by_all
-        by_poses = chained(by_twist, by_all, picture)
-        return Predicted(
+            of_pose, of_tool = to_board @ of_pose, to_board @ of_tool
+            of_frame = None if of_frame is None else to_board @ of_frame
+        return Shared(
             seen,
-            by_poses[:, :, :6],
-            {"tool": by_poses[:, :, 6:12], "lens": by_lens, "size": by_size[:, :, None]},
-            by_frame=None if at.frame is None else by_poses[:, :, 12:],
+            lots,
+            by_motion,
+            of_pose,
+            {"tool": of_tool},
+            {"lens": by_lens, "size": by_size[:, :, None]},
+            of_frame,
         )
 
     def dependences(self, data: InFit) -> Iterator[Dependence]:
@@ -225,16 +259,17 @@ class Camera(Reading):
         yield always("tool", "tool", PLACE, [self._carried_thing] * count, data.starts)
         yield Dependence("corner", "corner", self._corners(count), {}, every)
         lens = np.tile(self.lens_numbers(), (count, 1))
-        slots = _FOUND[self.lens]
-        found = {"": self._lens_numbers(m, slots)} if slots else {}
+        slots = FOUND[self.lens]
+        found = {self.camera_name: self._lens_found(m, slots)} if slots else {}
         yield Dependence("lens", "lens", lens, found, every)
         if self.find_size:
             extent = float(np.abs(self._corners(count)).max(initial=1.0))
             number = Numbers(
-                ("board.size",), ("1",), np.zeros(1, dtype=np.intp), np.zeros(1),
-                np.array([1.0 / extent]),
+                (_dotted("board", self.board_name, "size"),), ("1",),
+                np.zeros(1, dtype=np.intp), np.zeros(1), np.array([1.0 / extent]),
             )  # fmt: skip
-            yield Dependence("size", "size", np.zeros((count, 1)), {"": number}, every)
+            sizes = {self.board_name: number}
+            yield Dependence("size", "size", np.zeros((count, 1)), sizes, every)
 
     def starts(self, machine: Any, sets: Sets, found: Starts) -> None:
         """Start at the platform; `places_seen` finds the place together with the frame."""
@@ -248,41 +283,13 @@ class Camera(Reading):
         Of both places at which a small flat board looks alike that of which several pictures and
         the machine's poses (N, 6) agree; NaN in all other rows.
         """
-        found = np.full((len(m), 6), np.nan)
         used, number = self._pictures_told(m)
-        if not len(used):
-            return found
+        seen = self._corners(len(m))[used], m.values[used], number
         first = np.unique(number, return_index=True)[1]
-        at = pose[used[first]]
-        places, behind = self._in_agreement(m.values[used], m, used, number, at)
+        places = tool_places(*seen, self.lens_numbers(), self.on == "platform", pose[used[first]])
+        found = np.full((len(m), 6), np.nan)
         found[used[first]] = places
-        if behind and len(first) > _FEWEST:
-            mirrored = replace(self, p2=-self.p2)
-            across = m.values[used] * [-1, 1] + [2 * self.cx, 0]
-            other, _ = mirrored._in_agreement(across, m, used, number, at)
-            off, otherwise = disagreement(places, at), disagreement(other, at)
-            if off > _OFF and otherwise * _FALLS < off:
-                raise ArgumentError(
-                    f"measurements: the pictures are mirrored: where they show the board differs by"
-                    f" {np.degrees(off):.2g} deg from how the machine moves, and by"
-                    f" {np.degrees(otherwise):.2g} deg with left and right exchanged; take"
-                    " pictures without mirroring, or state u as the width less 1 less u"
-                )
         return found
-
-    def _in_agreement(
-        self, pixel: FloatArray, m: Measured, used: IntArray, number: IntArray, pose: FloatArray
-    ) -> tuple[FloatArray, bool]:
-        """The tool in the frame (P, 6) by pixels of rows `used`; whether most show it from behind.
-
-        `number` are their pictures, `pose` (P, 6) the machine's.
-        """
-        boards = board_poses(self._corners(len(m))[used], pixel, self.lens_numbers(), number)
-        seen = np.where(boards.possible[:, :, None], boards.pose, np.nan)
-        behind = bool(np.median(facing(boards)) < 0.0)
-        if self.on == "platform":
-            seen = twists.inverse(seen.reshape(-1, 6)).reshape(seen.shape)
-        return in_agreement(seen, pose), behind
 
     def doubts(self, m: Measured) -> Iterator[str]:
         """Lenses of turned or rectified pictures, mirrored pictures."""
@@ -338,7 +345,7 @@ class Camera(Reading):
     ) -> tuple[Camera, ArrayLike | None]:
         """Check lens, mounting and corners."""
         word("on", self.on, get_args(Mount))
-        word("lens", self.lens, tuple(_FOUND))
+        word("lens", self.lens, tuple(FOUND))
         if self.corner is None:
             raise ArgumentError(
                 "corner: pixels need the corner that each row shows: its place on the board, as"
@@ -355,9 +362,15 @@ class Camera(Reading):
         return own, read
 
     @property
-    def _carried_thing(self) -> str:
+    def _carried(self) -> Literal["board", "camera"]:
         """The one of camera and board that is on the platform."""
         return "board" if self.on == "base" else "camera"
+
+    @property
+    def _carried_thing(self) -> str:
+        """The name among tools of what is on the platform."""
+        name = self.board_name if self._carried == "board" else self.camera_name
+        return _dotted(self._carried, name)
 
     def _corners(self, count: int) -> FloatArray:
         return np.array(np.broadcast_to(np.asarray(self.corner, dtype=np.float64), (count, 3)))
@@ -366,24 +379,10 @@ class Camera(Reading):
         """The nine numbers (9,), in the order of `LENS`."""
         return np.array([getattr(self, name) for name in LENS], dtype=np.float64)
 
-    def _lens_numbers(self, m: Measured, slots: tuple[int, ...]) -> Numbers:
-        """Numbers of the lens that are found, counted by how much they move what is seen."""
-        lens = np.tile(self.lens_numbers(), (len(m), 1))
-        known = np.isfinite(m.values).all(axis=1)
-        rate = np.ones(9)
-        if known.any():
-            ahead = np.column_stack([unbent(m.values[known], lens[known]), np.ones(known.sum())])
-            by_lens = instruments.pixels(np.zeros((len(ahead), 6)), ahead, lens[known])[2]
-            rate = np.sqrt(np.nanmean(by_lens**2, axis=(0, 1)))
-        pixel = 1.0 / self.mm(m, 1000.0)[0]
-        chosen = list(slots)
-        return Numbers(
-            tuple(f"lens.{LENS[slot]}" for slot in slots),
-            tuple(_UNITS[slot] for slot in slots),
-            np.array(chosen, dtype=np.intp),
-            self.lens_numbers()[chosen],
-            pixel / np.maximum(rate, _LEAST)[chosen],
-        )
+    def _lens_found(self, m: Measured, slots: tuple[int, ...]) -> Numbers:
+        """Numbers of the lens that are found."""
+        mm, stem = float(self.mm(m, 1000.0)[0]), _dotted("lens", self.camera_name)
+        return numbers_of_lens(stem, self.lens_numbers(), slots, m.values, mm)
 
     def _pictures(self, m: Measured) -> IntArray:
         """Return the picture of each row, (N,), counted from 0."""
@@ -393,13 +392,19 @@ class Camera(Reading):
 
     # tables ---------------------------------------------------------------------------------------
 
+    def rows_of(self, table: Table) -> IntArray | None:
+        """Rows of this camera and this board, by columns ``camera`` and ``board``."""
+        if not {"u", "v"} <= table.columns.keys():
+            return None
+        return rows.of_names(table, {"camera": self.camera_name, "board": self.board_name})
+
     def found_in(self, table: Table) -> list[str]:
         """Columns u and v."""
         return ["u, v"] if {"u", "v"} <= table.columns.keys() else []
 
     def names(self, table: Table) -> set[str]:
         """Pixels, and the numbers of corners."""
-        return {"u", "v"} | ({"corner"} if "u" in table.columns else set())
+        return {"u", "v"} | ({"corner", "camera", "board"} if "u" in table.columns else set())
 
     def read(self, table: Table, units: Any) -> Camera:
         """Corners by their numbers on the board that is given, where the file has numbers."""

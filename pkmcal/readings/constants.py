@@ -39,8 +39,8 @@ def columns_of_constants(reading: Reading, rows: int) -> Iterator[WrittenColumn]
     """
     for name in names_of_constants(reading):
         value = getattr(reading, name)
-        if value is None:
-            continue
+        if value is None or value == _default(reading, name) == "":
+            continue  # an empty cell says nothing
         if not isinstance(value, bool | int | float | str | np.integer | np.floating):
             raise ArgumentError(
                 f"kind: {name} of {reading.name!r} is of class {kind(value)}, and a column holds"

@@ -7,8 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
-from pkmcal.core import screws
-from pkmcal.readings.board_poses import BoardPoses, board_poses
+from pkmcal.readings.board_poses import BoardPoses, board_poses, facing
 
 _FALLS = (
     3.0  # times less that corners are off with another lens, from which on that is the right one
@@ -74,10 +73,3 @@ def _typical(found: BoardPoses) -> float:
     """Return the misfit of corners in the median picture, px."""
     rms = found.rms[:, 0]
     return float(np.median(rms[np.isfinite(rms)])) if np.isfinite(rms).any() else float("inf")
-
-
-def facing(found: BoardPoses) -> FloatArray:
-    """Above 0 where a board is seen from the front (P,), its z pointing away from the camera."""
-    motion = screws.frames(np.ascontiguousarray(found.pose[:, 0]))
-    facing: FloatArray = (motion[:, :3, 2] * motion[:, :3, 3]).sum(axis=1)
-    return facing

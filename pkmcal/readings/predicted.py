@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from pkmcal.arguments import kind
-from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.arrays import FloatArray, IntArray, chained
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.readings.measured import Measured
 
 NOWHERE = np.zeros(6)
+MOTION = 6  # numbers of the motion of a lot of rows: ω, then v
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +94,67 @@ def require_predicted(name: str, components: int, rows: int, found: object) -> N
     for side in ("by_frame", "by_other"):
         if getattr(found, side) is not None:
             require_shape(f"{what}: {side}", getattr(found, side), (rows, components, 6))
+
+
+class Lots(NamedTuple):
+    """Rows in lots: those of a picture are one.
+
+    Attributes
+    ----------
+    of : ndarray of int (N,)
+        The lot of each row, 0 … L - 1.
+    first : ndarray of int (L,)
+        The first row of each.
+    """
+
+    of: IntArray
+    first: IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class Shared:
+    """Readings in lots whose rows follow the machine through one motion that they share.
+
+    As the corners of a picture do, through the motion of their board before the camera. However
+    many they are, all that they tell is told by as many rows as that motion has numbers, and one
+    more for each number that they depend on by themselves.
+
+    Attributes
+    ----------
+    values : ndarray (N, k)
+        As in `Predicted`.
+    lots : Lots
+        Of the rows.
+    by_motion : ndarray (N, k, 6)
+        Derivative to the motion, a twist.
+    by_twist, by_frame : ndarray (L, 6, 6)
+        How the motion follows the twist of the platform and the pose of the base; the latter is
+        None where there is no frame.
+    by : mapping of str to ndarray (L, 6, w)
+        How it follows arguments of `Reading.predict`, by their names.
+    own : mapping of str to ndarray (N, k, w)
+        Derivative to arguments that rows depend on by themselves: `Reading.by_rows`.
+    """
+
+    values: FloatArray
+    lots: Lots
+    by_motion: FloatArray
+    by_twist: FloatArray
+    by: Mapping[str, FloatArray]
+    own: Mapping[str, FloatArray]
+    by_frame: FloatArray | None = None
+
+    def of_rows(self) -> Predicted:
+        """The derivatives of each row."""
+        names, parts = list(self.by), [self.by_twist, *self.by.values()]
+        if self.by_frame is not None:
+            parts.append(self.by_frame)
+        ends = np.cumsum([part.shape[2] for part in parts])[:-1]
+        each = chained(self.by_motion, np.concatenate(parts, axis=2), self.lots.of)
+        by_twist, *others = np.split(each, ends, axis=2)
+        by_frame = None if self.by_frame is None else others.pop()
+        by = dict(zip(names, others, strict=True))
+        return Predicted(self.values, by_twist, {**by, **self.own}, by_frame=by_frame)
 
 
 def joined(parts: Sequence[Predicted], rows_of: Sequence[IntArray]) -> Predicted:

@@ -23,7 +23,7 @@ from pkmcal.files.csv_writer import WrittenColumn
 from pkmcal.readings import orientation, rows
 from pkmcal.readings.alignment import Laid, Sighting
 from pkmcal.readings.measured import InFit, Measured
-from pkmcal.readings.predicted import At, Predicted, require_predicted
+from pkmcal.readings.predicted import At, Lots, Predicted, Shared, require_predicted
 from pkmcal.readings.unknowns import Dependence, Found
 
 Components = tuple[tuple[str, str], ...]
@@ -105,6 +105,8 @@ class Reading:
         Whether poses can be planned for the object that its word stands for.
     starts_by_pose : bool
         Whether `starts` needs the poses of the nominal machine.
+    by_rows : tuple of str
+        Arguments of `shared` that rows depend on by themselves, not through their lot's motion.
     per_row : tuple of str
         Fields with an entry for every row.
     labels : tuple of str
@@ -138,6 +140,7 @@ class Reading:
     by_firmware: ClassVar[bool] = False
     planned: ClassVar[bool] = True
     starts_by_pose: ClassVar[bool] = False
+    by_rows: ClassVar[tuple[str, ...]] = ()
     per_row: ClassVar[tuple[str, ...]] = ()
     labels: ClassVar[tuple[str, ...]] = ()
     anew: ClassVar[str] = ""
@@ -156,6 +159,33 @@ class Reading:
             Where the machine is.
         **numbers : ndarray (w,) or (N, w)
             The arguments that `dependences` names.
+        """
+        raise NotImplementedError
+
+    @property
+    def frame_name(self) -> str:
+        """The name of the frame that readings are in, where there may be several; else ""."""
+        return ""
+
+    @property
+    def stands_by(self) -> str:
+        """The thing that stands in that frame, "" of instruments that may be placed anywhere.
+
+        Readings of one frame have to agree on it.
+        """
+        return ""
+
+    def lots(self, m: Measured) -> IntArray | None:
+        """The lot of each row (N,) by rows alone, of readings that `shared` can compute.
+
+        None: rows have nothing in common, and `predict` is all there is.
+        """
+        return None
+
+    def shared(self, at: At, lots: Lots, **numbers: FloatArray) -> Shared:
+        """Compute `predict` through the motions of lots of rows at one place each.
+
+        The result stands for many rows by few equations, without a loss.
         """
         raise NotImplementedError
 
@@ -270,13 +300,6 @@ class Reading:
         each = self.mm(m, length)
         return np.asarray(np.median(each, axis=0) if each.ndim > 1 else each, dtype=np.float64)
 
-    def distance_per_point(self, residual: FloatArray, m: Measured, length: float) -> FloatArray:
-        """Return the distance of each measured point, mm (N,); angles count as their arc."""
-        if self.units:
-            residual = residual * self.mm(m, length)
-        off: FloatArray = np.linalg.norm(residual, axis=1)
-        return off
-
     # rows -----------------------------------------------------------------------------------------
 
     def of_rows(
@@ -380,6 +403,10 @@ class Reading:
         """
         names = [name for name, _ in self.components]
         return [", ".join(names)] if any(name in table.columns for name in names) else []
+
+    def rows_of(self, table: Table) -> IntArray | None:
+        """Rows of a table that it reads; None: all."""
+        return None
 
     def names(self, table: Table) -> set[str]:
         """Names of all columns of a table that this kind reads."""

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal.arguments import shown, words
-from pkmcal.arrays import FloatArray, TextArray, as_numbers
+from pkmcal.arrays import FloatArray, IntArray, TextArray, as_numbers
 from pkmcal.exceptions import ArgumentError
+from pkmcal.files.csv_table import Table
 from pkmcal.files.reading import LONGEST_NAME
 
 
@@ -63,3 +64,33 @@ def names(argument: str, given: Sequence[str] | TextArray, rows: int) -> TextArr
                 f" found {shown(name)}"
             )
     return np.array(found)
+
+
+def of_names(table: Table, wanted: Mapping[str, str]) -> IntArray:
+    """Rows of a table whose columns, as far as it has them, have these names.
+
+    Raises
+    ------
+    ValueError
+        A column with several names of which none is wanted, ""; a name that it has not.
+    """
+    own = np.ones(len(table), dtype=bool)
+    for column, name in wanted.items():
+        if column not in table.columns:
+            continue
+        texts = np.array(table.texts(column))
+        there = list(dict.fromkeys(texts.tolist()))
+        if not name and len(there) > 1:
+            raise table.header_error(
+                f"column {column!r}: there are several, {', '.join(there)}; name each, as"
+                f" --{column} {there[0]}=… --{column} {there[1]}=… ({column}_name=)"
+            )
+        if name and name not in there:
+            raise table.header_error(
+                f"column {column!r}: no row of {name!r}; found {', '.join(there)}"
+            )
+        own &= (texts == name) | (not name)
+    if not own.any():
+        said = " and ".join(f"{column} {name!r}" for column, name in wanted.items())
+        raise table.header_error(f"there is no row of {said}")
+    return np.flatnonzero(own)

@@ -13,13 +13,81 @@ import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.core.poses import compose
-from pkmcal.readings import orientation
+from pkmcal.exceptions import ArgumentError
+from pkmcal.readings import orientation, twists
+from pkmcal.readings.board_poses import board_poses, facing
 from pkmcal.readings.hand_eye import of_frame_and_tool
 
+_FEWEST = 4  # pictures, more of which tell that they are mirrored
+_OFF, _FALLS = 0.1, 3.0  # rad by which mirrored pictures are off, and how many times less mirrored
 _DRAWN = 5  # pictures of a draw
 _DRAWS = 60
 _ROUNDS = 10  # of choosing and laying in turn
 _GROSS = 0.2  # rad, or share of the distance, beyond which a picture is off and no more
+
+
+def tool_places(
+    corner: FloatArray,
+    pixel: FloatArray,
+    picture: IntArray,
+    lens: FloatArray,
+    rides: bool,
+    pose: FloatArray,
+) -> FloatArray:
+    """Pose (P, 6) of the tool in the frame of what stands, by each picture.
+
+    Parameters
+    ----------
+    corner, pixel : ndarray (N, 3), (N, 2)
+        Corners in axes of the board, mm, and where they are seen.
+    picture : ndarray of int (N,)
+        Of each, 0 … P - 1.
+    lens : ndarray (9,)
+        As in `board_poses`.
+    rides : bool
+        Whether the camera is the tool, not the board.
+    pose : ndarray (P, 6)
+        Of the nominal machine.
+
+    Raises
+    ------
+    ValueError
+        The pictures are mirrored.
+    """
+    if not len(pose):
+        return np.empty((0, 6))
+    places, behind = _agreed(corner, pixel, picture, lens, rides, pose)
+    if not behind or len(pose) <= _FEWEST:
+        return places
+    mirrored = lens * np.where(np.arange(9) == 7, -1.0, 1.0)  # p2
+    across = pixel * [-1, 1] + [2 * lens[2], 0]
+    other, _ = _agreed(corner, across, picture, mirrored, rides, pose)
+    off, otherwise = disagreement(places, pose), disagreement(other, pose)
+    if off > _OFF and otherwise * _FALLS < off:
+        raise ArgumentError(
+            f"measurements: the pictures are mirrored: where they show the board differs by"
+            f" {np.degrees(off):.2g} deg from how the machine moves, and by"
+            f" {np.degrees(otherwise):.2g} deg with left and right exchanged; take"
+            " pictures without mirroring, or state u as the width less 1 less u"
+        )
+    return places
+
+
+def _agreed(
+    corner: FloatArray,
+    pixel: FloatArray,
+    picture: IntArray,
+    lens: FloatArray,
+    rides: bool,
+    pose: FloatArray,
+) -> tuple[FloatArray, bool]:
+    """Return `tool_places`, and whether most pictures show the board from behind."""
+    boards = board_poses(corner, pixel, lens, picture)
+    seen = np.where(boards.possible[:, :, None], boards.pose, np.nan)
+    behind = bool(np.median(facing(boards)) < 0.0)
+    if rides:
+        seen = twists.inverse(seen.reshape(-1, 6)).reshape(seen.shape)
+    return in_agreement(seen, pose), behind
 
 
 def in_agreement(seen: FloatArray, pose: FloatArray) -> FloatArray:

@@ -45,6 +45,6 @@ def twists_of_numbers(pose: FloatArray) -> FloatArray:
 def _crossed(place: FloatArray) -> FloatArray:
     """Matrices (N, 3, 3) of cross products with places (N, 3)."""
     found = np.zeros((len(place), 3, 3))
-    for i in range(3):
-        found[:, :, i] = np.cross(place, np.eye(3)[i])
+    for i, (j, k) in enumerate(((1, 2), (2, 0), (0, 1))):
+        found[:, j, k], found[:, k, j] = -place[:, i], place[:, i]
     return found

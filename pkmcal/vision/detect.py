@@ -7,54 +7,32 @@ from dataclasses import dataclass, replace
 from hashlib import sha256
 from os import PathLike
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from pkmcal.arguments import function, instance, path
+from pkmcal.arguments import function, instance
 from pkmcal.arrays import FloatArray, Int64Array, IntArray
 from pkmcal.display import Table, printable
-from pkmcal.exceptions import ArgumentError, FileError
 from pkmcal.files.csv_writer import WrittenColumn, write_csv
-from pkmcal.readings import orientation
-from pkmcal.readings.board_poses import board_poses, in_a_line
 from pkmcal.readings.boards import Board
 from pkmcal.readings.camera import Camera
 from pkmcal.result import Result
-from pkmcal.vision.detectors import NOTHING, Finder, Seen, finder, opencv
+from pkmcal.vision.detectors import NOTHING, Finder, finder, opencv
+from pkmcal.vision.pictures import (
+    FEWEST,
+    Picture,
+    files,
+    grey,
+    looked_at,
+    of_one_board,
+    of_one_size,
+    sharp,
+)
 from pkmcal.vision.sheet import Panel, draw
 
-_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".pgm", ".ppm")
-_FEWEST = 6  # corners of a picture that is taken
-_BENT = 5.0  # times what corners of other pictures are off their board, and
-_OFF = 0.5  # px at least: moved while it was taken, or corners with wrong numbers
-_BLURRED = 1 / 3  # of the median contrast of other pictures
 _EDGE = 1 / 8  # of a picture, in which corners tell the distortion
 _TILTED = np.radians(5.0)  # between pictures, of a board that is tilted enough to tell the lens
-
-
-class Picture(NamedTuple):
-    """A picture and its corners.
-
-    Attributes
-    ----------
-    path : Path
-        The file.
-    seen : Seen
-        Corners; none of a picture that is not taken.
-    bad : str
-        Why it is not taken; "" where it is.
-    size : (int, int)
-        Width and height, px.
-    contrast : float
-        Steepest grey levels at corners, a pixel.
-    """
-
-    path: Path
-    seen: Seen
-    bad: str = ""
-    size: tuple[int, int] = (0, 0)
-    contrast: float = np.nan
 
 
 @dataclass(frozen=True, repr=False)
@@ -100,7 +78,9 @@ class Detection(Result):
         """Place of each corner, (N, 2), px."""
         return np.concatenate([np.empty((0, 2)), *(each.seen.pixel for each in self.taken)])
 
-    def write(self, path: str | PathLike[str], comment: str = "") -> None:
+    def write(
+        self, path: str | PathLike[str], comment: str = "", *, camera: str = "", board: str = ""
+    ) -> None:
         """Write a CSV file of image, corner, u and v, as `pkmcal calibrate` reads it.
 
         Parameters
@@ -109,9 +89,16 @@ class Detection(Result):
             The file.
         comment : str
             Lines for its head, each with its ``#``.
+        camera, board : str
+            Their names, where there are several; each is a column.
         """
         u, v = self.pixel.T
         columns = [
+            WrittenColumn(name, "", np.full(len(u), which))
+            for name, which in (("camera", camera), ("board", board))
+            if which
+        ]
+        columns += [
             WrittenColumn(
                 "image", "", np.array([each.path.name for each in self.taken])[self.image]
             ),
@@ -126,7 +113,7 @@ class Detection(Result):
         """Write a PNG file with all pictures, corners marked; those that are bad in red frames."""
         panels = [
             Panel(
-                _grey_or_none(each.path),
+                grey(each.path, each.path.read_bytes()),
                 each.path.name,
                 each.seen.ids,
                 each.seen.pixel,
@@ -191,7 +178,7 @@ def detect(
         instance("camera", camera, Camera)
     if progress is not None:
         function("progress", progress)
-    paths = _files(images)
+    paths = files(images)
     finds = finder(board)
     pictures, contents = list[Picture](), dict[bytes, str]()
     for file in paths:
@@ -200,158 +187,14 @@ def detect(
         if first != file.name:
             pictures.append(Picture(file, NOTHING, f"the same picture as {first}"))
         else:
-            pictures.append(_picture(file, _grey(file, content), finds))
+            pictures.append(looked_at(file, grey(file, content), finds))
         if progress is not None:
             progress(len(pictures), len(paths))
-    pictures = _of_one_size(pictures)
-    pictures, tilts = _of_one_board(pictures, board, camera)
-    pictures = _sharp(pictures)
+    pictures = of_one_size(pictures)
+    pictures, tilts = of_one_board(pictures, board, camera)
+    pictures = sharp(pictures)
     found = Detection(board, tuple(pictures))
     return replace(found, remarks=tuple(_remarks(found, board, tilts, finds)))
-
-
-def _files(images: str | PathLike[str] | Iterable[str | PathLike[str]]) -> list[Path]:
-    if isinstance(images, str | PathLike) or not isinstance(images, Iterable):
-        images = [path("images", images)]
-    given = [path("images", each) for each in images]
-    paths: list[Path] = []
-    for each in given:
-        if each.is_dir():
-            inside = [f for f in each.iterdir() if f.suffix.lower() in _SUFFIXES]
-            paths += sorted(inside, key=lambda f: _natural(f.name))
-        else:
-            paths.append(each)
-    if not paths:
-        raise ArgumentError(
-            f"images: no pictures ({', '.join(_SUFFIXES[:4])} …) were found in"
-            f" {', '.join(map(str, given)) or 'nothing'}"
-        )
-    names = [each.name for each in paths]
-    twice = next((name for i, name in enumerate(names) if name in names[:i]), None)
-    if twice is not None:
-        raise ArgumentError(
-            f"images: two pictures are called {twice}: names tell which joints belong to which"
-        )
-    return paths
-
-
-def _natural(name: str) -> list[tuple[bool, int, str]]:
-    """A key that puts 2.png before 10.png."""
-    parts = "".join(c if c.isdigit() else f" {c} " for c in name).split()
-    return [(False, int(p), "") if p.isdecimal() else (True, 0, p) for p in parts]
-
-
-def _grey(path: Path, content: bytes) -> Any:
-    cv2 = opencv()
-    image = cv2.imdecode(np.frombuffer(content, dtype=np.uint8), cv2.IMREAD_GRAYSCALE)
-    if image is None:
-        raise FileError(f"{path}: this is no picture that can be read")
-    return image
-
-
-def _grey_or_none(path: Path) -> Any:
-    return _grey(path, path.read_bytes())
-
-
-def _picture(path: Path, grey: Any, finds: Finder) -> Picture:
-    height, width = grey.shape
-    seen = finds(grey)
-    if not len(seen.ids):
-        others = f" ({seen.strange} markers of its dictionary, none of it)" if seen.strange else ""
-        return Picture(path, seen, f"no board found{others}", (width, height))
-    bad = ""
-    if len(seen.ids) < _FEWEST:
-        bad = f"{len(seen.ids)} corners, {_FEWEST} are needed"
-    return Picture(path, seen, bad, (width, height), _contrast(grey, seen.pixel))
-
-
-def _contrast(grey: Any, pixel: FloatArray) -> float:
-    """Return the contrast next to corners, pixel to pixel, the median of the largest."""
-    height, width = grey.shape
-    steepest = []
-    for u, v in pixel.round().astype(int):
-        near = grey[max(v - 3, 0) : min(v + 4, height), max(u - 3, 0) : min(u + 4, width)]
-        steps = [np.abs(np.diff(near.astype(float), axis=k)) for k in (0, 1)]
-        steepest.append(max((each.max(initial=0.0) for each in steps), default=0.0))
-    return float(np.median(steepest))
-
-
-def _of_one_size(pictures: list[Picture]) -> list[Picture]:
-    """Pictures of another size than most are bad."""
-    sizes = [each.size for each in pictures if not each.bad]
-    if not sizes:
-        return pictures
-    usual = max(set(sizes), key=sizes.count)
-    off = f"the others {usual[0]} x {usual[1]}"
-    return [
-        each._replace(bad=f"{each.size[0]} x {each.size[1]}, {off}")
-        if not each.bad and each.size != usual
-        else each
-        for each in pictures
-    ]
-
-
-def _of_one_board(
-    pictures: list[Picture], board: Board, camera: Camera | None
-) -> tuple[list[Picture], FloatArray]:
-    """Pictures whose corners are off where a board has them are bad; tilts (P, 3) with a lens.
-
-    By the lens where it is known; else by a projection of a plane, which hardly bends.
-    """
-    pictures = list(pictures)
-    tilts = np.full((len(pictures), 3), np.nan)
-    off = np.full(len(pictures), np.nan)
-    for i, each in enumerate(pictures):
-        if each.bad:
-            continue
-        places = board.at(each.seen.ids)
-        if in_a_line(places, np.zeros(len(places), dtype=np.intp), 1)[0]:
-            pictures[i] = each._replace(bad=f"{len(places)} corners in a line tell no turning")
-            continue
-        if camera is not None:
-            one = np.zeros(len(places), dtype=np.intp)
-            found = board_poses(places, each.seen.pixel, camera.lens_numbers(), one)
-            off[i], tilts[i] = found.rms[0, 0], _normal(found.pose[0, 0])
-        else:
-            off[i] = _off_a_plane(places, each.seen.pixel)
-    known = np.isfinite(off)
-    if not known.any():
-        return pictures, tilts
-    usual = float(np.median(off[known]))
-    result = list(pictures)
-    for i in np.flatnonzero(known & (off > max(_BENT * usual, _OFF))).tolist():
-        why = f"corners are {off[i]:.1f} px off a board, of the others {usual:.1f}: it has moved"
-        result[i] = pictures[i]._replace(bad=f"{why}, or numbers of corners are wrong")
-        tilts[i] = np.nan
-    return result, tilts
-
-
-def _normal(pose: FloatArray) -> FloatArray:
-    normal: FloatArray = orientation.rotations(pose[None, 3:])[0][:, 2]
-    return normal
-
-
-def _off_a_plane(places: FloatArray, pixel: FloatArray) -> float:
-    """Root mean square distance of corners from a projection of the board, px."""
-    cv2 = opencv()
-    plane = places[:, None, :2]
-    to_pixel = cv2.findHomography(plane, pixel[:, None])[0]
-    if to_pixel is None:
-        return float("inf")
-    seen = cv2.perspectiveTransform(plane, to_pixel)[:, 0]
-    return float(np.sqrt(((seen - pixel) ** 2).sum(axis=1).mean()))
-
-
-def _sharp(pictures: list[Picture]) -> list[Picture]:
-    """Blurred pictures are bad."""
-    levels = [each.contrast for each in pictures if not each.bad]
-    least = _BLURRED * float(np.median(levels)) if levels else 0.0
-    return [
-        each._replace(bad=f"blurred: contrast {each.contrast:.0f} of {3 * least:.0f}")
-        if not each.bad and each.contrast < least
-        else each
-        for each in pictures
-    ]
 
 
 def _remarks(found: Detection, board: Board, tilts: FloatArray, finds: Finder) -> Iterator[str]:
@@ -401,6 +244,6 @@ def _seen_in_a_mirror(pictures: Sequence[Picture], finds: Finder) -> bool:
     """Return whether the first picture that shows no board shows one from behind."""
     for each in pictures:
         if each.bad.startswith("no board"):
-            grey = _grey(each.path, each.path.read_bytes())
-            return len(finds(np.ascontiguousarray(grey[:, ::-1])).ids) >= _FEWEST
+            levels = grey(each.path, each.path.read_bytes())
+            return len(finds(np.ascontiguousarray(levels[:, ::-1])).ids) >= FEWEST
     return False

@@ -179,6 +179,8 @@ def poses_of_equations(isa: int, part: slice, call: str) -> list[np.ndarray]:
         left, following = poses.left(by_unknown, columns)
         if call == "pose_normals":
             found += [matrix, pull, cost]
+        elif call == "pose_triangle":
+            found.append(poses.triangle(by_unknown))
         elif call == "pose_fit":
             residual = np.ascontiguousarray(columns[:, 0])
             *of_poses, rest = poses.fit(residual, by_unknown, np.full(len(cost), 0.1), 0.01, 1e-3)
@@ -257,6 +259,7 @@ CASES: dict[str, Case] = {
     "slider_work": lambda isa, part: work_at_anchors(isa, part, "linear-delta"),
     "crank_work": lambda isa, part: work_at_anchors(isa, part, "rotary-delta"),
     "pose_normals": lambda isa, part: poses_of_equations(isa, part, "pose_normals"),
+    "pose_triangle": lambda isa, part: poses_of_equations(isa, part, "pose_triangle"),
     "pose_fit": lambda isa, part: poses_of_equations(isa, part, "pose_fit"),
     "pose_left": lambda isa, part: poses_of_equations(isa, part, "pose_left"),
     "pose_spread": lambda isa, part: poses_of_equations(isa, part, "pose_spread"),

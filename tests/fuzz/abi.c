@@ -355,7 +355,8 @@ static void of_poses(ptrdiff_t n, unsigned strange, int isas)
     const double *part = numbers(total * columns, strange), *rest = numbers(left * columns, strange);
     const double *damping = numbers(n, strange);
     double *work = fresh(sizeof *work * PKM_WIDEST * (MOST + (size_t)u + 1) * ((size_t)u + 1));
-    one_of(4);
+    one_of(5);
+    EACH_ISA(pose_triangle, n, u, first, order, slopes, D(0, n * u * u), work);
     EACH_ISA(pose_normals, n, u, first, order, residual, slopes, D(0, n * u * u), D(1, n * u), D(2, n),
              work);
     EACH_ISA(pose_fit, n, u, first, order, residual, slopes, damping, 1e-12, 1e-12, place, D(0, n * u),

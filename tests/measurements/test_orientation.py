@@ -110,7 +110,8 @@ def test_derivatives_of_residuals_are_their_differences(name: str, framed: bool)
     equations = Equations.of([data], chosen)
     theta = chosen.start.copy()
     if framed:
-        theta[chosen.frame : chosen.frame + 6] = [40, -20, 9, 0.4, np.pi / 2, 2.0]
+        frame = chosen.nuisance["frame", ""]
+        theta[frame : frame + 6] = [40, -20, 9, 0.4, np.pi / 2, 2.0]
     near = equations.at(theta).states.at_poses(np.arange(len(at)), at)
     (jacobian,) = equations.jacobian(equations.at(theta, near=near))
     for j, scale in enumerate(chosen.scale):

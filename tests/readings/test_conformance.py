@@ -49,8 +49,9 @@ def test_derivatives_are_those_of_differences(case: Case, unknown: bool) -> None
     chosen = parameters(robot, [share], Asked(free))
     equations = Equations.of([share], chosen)
     theta = chosen.start.copy()
-    if chosen.frame is not None:
-        theta[chosen.frame : chosen.frame + 6] = case.frame
+    if share.frame is not None:
+        frame = chosen.nuisance[share.frame]
+        theta[frame : frame + 6] = case.frame
     (jacobian,) = equations.jacobian(equations.at(theta))
     columns = []
     for j, scale in enumerate(chosen.scale):
