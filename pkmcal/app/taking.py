@@ -152,7 +152,7 @@ def taken(project: Project, names: Sequence[str]) -> Taken:
         if kind in _BESIDE:
             job = found.project.calibration
             lens, columns = job.reading.camera, job.reading.columns
-            lens, columns = (name, columns) if kind == "camera" else (lens, name)
+            lens, columns = ((name,), columns) if kind == "camera" else (lens, name)
             job = replace(job, reading=replace(job.reading, camera=lens, columns=columns))
             project = replace(found.project, calibration=job)
             found = Taken(project, (*found.said, f"{printable(name)}: {_BESIDE[kind]}"))

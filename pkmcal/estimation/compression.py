@@ -79,6 +79,8 @@ class RowsInLots:
         turning = measured.instrument.turning is not None
         if alike is None or turning or prediction.effects[i]:
             return None
+        if len(np.unique(whitening.groups[i])) > 1:  # numbers of a lot have one noise
+            return None
         keys = [alike, table.pose_of[i], table.part_of[i]]
         keys += [each.T[0] - NONE for each in prediction.columns[i].values()]
         lot = numbered(*keys)
@@ -280,6 +282,14 @@ def compressed(
     parts = [(w, r) if own is None else (one, one > 0.0) for own, w, r, one in several]
     return (
         CompressedPrediction(**known, whole=prediction, whitening=whitening, lots=found),
-        replace(whitening, white=tuple(w for w, _ in parts), read=tuple(r for _, r in parts)),
+        replace(
+            whitening,
+            white=tuple(w for w, _ in parts),
+            read=tuple(r for _, r in parts),
+            groups=tuple(
+                group if own is None else np.full(wide, group[0])
+                for group, own, wide in zip(whitening.groups, found, width, strict=True)
+            ),
+        ),
         np.concatenate(beyond),
     )

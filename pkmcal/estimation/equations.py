@@ -157,15 +157,18 @@ class Equations:
         prediction, whitening, beyond_rows = found
         table, unstated = prediction.table, self.blocks.unstated
         if isinstance(self.blocks, PoseBlocks):
-            slack = self.blocks.slack
-            blocks: RowBlocks = pose_blocks(table, self.machines, slack, unstated, self.size)
+            slack, of_readings = self.blocks.slack, whitening.of_equations(whitening.groups)
+            blocks: RowBlocks = pose_blocks(
+                table, self.machines, slack, unstated, of_readings, self.size
+            )
             if not np.array_equal(blocks.pose_of_block, self.blocks.pose_of_block):
                 return None
         else:
             blocks = row_blocks(table, unstated, self.missing)
         beyond = np.zeros((len(blocks.components), len(unstated)), dtype=np.intp)
         counts = blocks.block_of_row >= 0
-        place = blocks.block_of_row[counts], table.set_of[counts]
+        group = np.array([own[0] if len(own) else 0 for own in whitening.groups])
+        place = blocks.block_of_row[counts], group[table.set_of[counts]]
         np.add.at(beyond, place, beyond_rows[counts])
         return replace(
             self,
