@@ -219,6 +219,10 @@ def _started() -> bool:
         return False
 
 
+def _many(count: int, what: str) -> str:
+    return f"{count} {what}{'s' * (count != 1)}"
+
+
 def _told(courses: Iterator[Course], last: list[Course] | None = None) -> Course | None:
     """Say what each pose told; the last course."""
     found = None
@@ -226,7 +230,7 @@ def _told(courses: Iterator[Course], last: list[Course] | None = None) -> Course
         if last is not None:
             last.append(found)
         rows = 0 if found.rows is None else len(found.rows)
-        say(f"pose {found.poses}, row {rows}: {_predicted(found)}")
+        say(f"{_many(found.poses, 'pose')}, {_many(rows, 'row')}: {_predicted(found)}")
         if found.odd is not None:
             tell(f"warning: the newest rows contradict the others: {found.odd}")
     return found

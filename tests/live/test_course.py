@@ -119,7 +119,7 @@ def test_replay_says_how_many_rows_were_enough(
     choice = pk.next_pose(PRINTER, places(PRINTER, log_of(1))[0], kind="height", noise=NOISE,
                           direction=UP)  # fmt: skip
     last = ran(Course(choice, True, 0.02), log_of(1))[-1]
-    assert said[-3].startswith(f"pose {last.poses}, row {last.poses}: predicted error")
+    assert said[-3].startswith(f"{last.poses} poses, {last.poses} rows: predicted error")
     assert said[-1].endswith("enough") and result.exit_code == 0
     result = run(*map(str, command), "--count", "3")
     assert "too few to identify" in result.stdout and result.exit_code == 0
