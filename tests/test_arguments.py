@@ -373,6 +373,22 @@ CALLS: dict[str, Call] = {
             "travel_weight": "number",
         },
     ),
+    "next_pose": (
+        pk.next_pose,
+        {"robot": ROBOT, "candidates": POSES, "free": "offset*"},
+        {
+            "robot": "robot",
+            "candidates": "numbers",
+            "targets": "numbers",
+            "criterion": "word",
+            "kind": "word",
+            "target": "numbers",
+            "noise": "positive",
+            "free": "names",
+            "prior": "one or by name",
+            "unknown": "names",
+        },
+    ),
     "plan_poses, accuracy": (
         pk.plan_poses,
         {"robot": ROBOT, "candidates": POSES, "accuracy": 1.0, "free": "offset*"},
@@ -596,6 +612,7 @@ def test_every_public_call_is_among_them() -> None:
         "machines",
         "CHECKS",
         "CONSTRICTION",
+        "NextPose",  # `next_pose` makes it
         "export",
         "screw",
         "trajectory",

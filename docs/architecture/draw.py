@@ -15,6 +15,7 @@ NOTES = {  # of the floor with this room
     "cli": "a verb a file",
     "app": "the window in the browser",
     "jobs": "what options say; files in and out",
+    "live": "machines that are driven, pose by pose",
     "report": "pages; faces of controllers and moves",
     "calibration": "identify; poses to measure; firmware, C",
     "diagnostics": "checks, verdict",

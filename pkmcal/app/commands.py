@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import PurePath
 from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
 
-from pkmcal.arms.arm import SerialArm
 from pkmcal.controllers.target import Target
 from pkmcal.controllers.targets import targets
 from pkmcal.exceptions import Error
@@ -13,7 +13,10 @@ from pkmcal.jobs.calibration import Writing
 from pkmcal.jobs.configuration import Exporting
 from pkmcal.jobs.project import Project
 from pkmcal.jobs.stated import quoted
-from pkmcal.kinematics.robot import Robot
+
+if TYPE_CHECKING:
+    from pkmcal.arms.arm import SerialArm
+    from pkmcal.kinematics.robot import Robot
 
 REPORT, PLAN = "report", "plan"  # folders of the calibrated machine, and of planned poses
 OUTPUTS = frozenset(target.file for target in targets().values())
@@ -48,6 +51,8 @@ def export(target: str) -> Exporting:
 
 def offered(machine: Robot | SerialArm) -> list[Target]:
     """Return the targets that the window offers for a machine."""
+    from pkmcal.arms.arm import SerialArm  # the server shows commands without NumPy
+
     takes = "arm" if isinstance(machine, SerialArm) else "parallel"
     named = [each for each in targets().values() if each.label and each.takes in (takes, "any")]
     return [each for each in named if not each.tried or _holds(each, machine)]

@@ -150,8 +150,8 @@ def measure(
     once. Nothing moves before you type start; Ctrl-C stops machine and measurement.
     Exit code 1: stopped before the accuracy or count was there; every row is in the log.
 
-    Example: pkmcal measure robot.toml --machine person --instrument person --kind height
-    --noise 0.02 --direction z --accuracy 0.05
+    Example: pkmcal measure examples/linear-delta/robot.toml --machine person --instrument person
+    --kind height --noise 0.02 --direction z --accuracy 0.05
     """
     job = Planning(
         robot,

@@ -40,14 +40,12 @@ def with_starts(machine: Calibratable, datasets: Sequence[FitData]) -> list[FitD
 
 
 def _ask(reading: Reading, machine: Calibratable, pairs: Sets, found: Found) -> None:
-    """Have a reading say where the search starts; without poses it may fail for want of them."""
-    if reading.starts_by_pose:
+    """Have a reading say where the search starts; one of the user's may fail for want of poses."""
+    if reading.starts_by_pose or reading.name in KINDS:
         reading.starts(machine, pairs, found)
         return
     try:
         reading.starts(machine, pairs, found)
-    except ArgumentError:
-        raise
     except Exception as error:
         raise ArgumentError(
             f"kind: starts of {reading.name!r} failed with {type(error).__name__}: {error}; where"

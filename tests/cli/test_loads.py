@@ -102,7 +102,7 @@ def test_program_is_corrected_for_the_load_of_each_tool(
         ),
         (("stiffness", "hexapod", "--compliance", "offset*=0"), "what does not yield is left out"),
         (("stiffness", "hexapod", "--compliance", "offset*=2e4"), "its compliance is 5e-05"),
-        (("forward", "3r", "0,0,0", "--payload", "5"), "carries no payload here"),
+        (("forward", "3r", "0,0,0", "--payload", "5"), "of which nothing yields to a payload"),
     ],
 )
 def test_what_makes_no_sense_is_refused(refused: Any, arguments: tuple, message: str) -> None:

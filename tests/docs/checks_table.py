@@ -28,7 +28,7 @@ def stated() -> str:
     """The table as the page has it."""
     text = PAGE.read_text(encoding="utf-8")
     start = text.index(_BEGIN)
-    return text[start : text.index(_END, start)]
+    return text[start:].partition(_END)[0].rstrip("\n")
 
 
 if __name__ == "__main__":
