@@ -9,7 +9,7 @@ a likelihood ratio between two hypotheses): no threshold has to be tuned.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -18,6 +18,7 @@ from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.diagnostics.check import Check, at_most_one
 from pkmcal.diagnostics.other_readings import other_values
 from pkmcal.diagnostics.reach import reach
+from pkmcal.estimation.whitening import Whitening
 from pkmcal.fitted.solution import Solution
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.statistics.linear_fit import column_basis, numbered, orthonormal
@@ -55,13 +56,23 @@ class _Compared:
     ----------
     found : Solution
         The calibration.
-    use, group : ndarray of int (m,)
-        Which equations, and which family of which set each is of.
-    design : ndarray (m, p)
+    sets : tuple of Measurements
+        The rows that these equations are of.
+    predicted, residuals : tuple of ndarray (N, k)
+        What these rows should read, and measured less that.
+    whitening : Whitening
         Theirs.
+    use, group : ndarray of int (m,)
+        Which of their equations, and which family of which set each is of.
+    design : ndarray (m, p)
+        Derivatives of these equations.
     """
 
     found: Solution
+    sets: tuple[Measurements, ...]
+    predicted: tuple[FloatArray, ...]
+    residuals: tuple[FloatArray, ...]
+    whitening: Whitening
     use: IntArray
     group: IntArray
     design: FloatArray
@@ -73,7 +84,28 @@ class _Compared:
         use = sure.fit.without_idle(np.flatnonzero(~odd))
         use = use[:: max(1, -(-len(use) // _MOST))]
         group = numbered(sure.labels.set_of[use], sure.labels.family[use])
-        return cls(found, use, group, sure.fit.design[use])
+        table, end, white = sure.equations.table, found.fit.end, sure.equations.whitening
+        needed = np.zeros(len(table.rows), dtype=bool)
+        needed[sure.labels.row[use]] = True
+        rows = [np.flatnonzero(needed[table.set_of == i]) for i in range(len(table.sets))]
+        rows = [own if len(own) else np.arange(1) for own in rows]  # measurements have a row
+        for i, own in enumerate(rows):
+            needed[np.flatnonzero(table.set_of == i)[own]] = True
+        among = np.flatnonzero(needed[sure.labels.row])
+        return cls(
+            found,
+            tuple(m.select(own) for m, own in zip(table.sets, rows, strict=True)),
+            tuple(each[own] for each, own in zip(end.predicted, rows, strict=True)),
+            tuple(each[own] for each, own in zip(end.residuals, rows, strict=True)),
+            replace(
+                white,
+                white=tuple(each[own] for each, own in zip(white.white, rows, strict=True)),
+                read=tuple(each[own] for each, own in zip(white.read, rows, strict=True)),
+            ),
+            np.searchsorted(among, use),
+            group,
+            sure.fit.design[use],
+        )
 
     @cached_property
     def basis(self) -> FloatArray:
@@ -81,10 +113,9 @@ class _Compared:
 
     def residual(self, i: int, reading: Measurements) -> FloatArray:
         """Compute these residuals (m,) with other readings of set `i`."""
-        sure, end = self.found.fit.uncertainty, self.found.fit.end
-        parts = list(end.residuals)
-        parts[i] = reading.instrument.difference(reading.values, end.predicted[i])
-        return sure.equations.whitening.whitened(parts, sure.factors)[self.use]
+        parts = list(self.residuals)
+        parts[i] = reading.instrument.difference(reading.values, self.predicted[i])
+        return self.whitening.whitened(parts, self.found.fit.uncertainty.factors)[self.use]
 
     @cached_property
     def reach(self) -> FloatArray:
@@ -137,7 +168,7 @@ def likelier_reading(found: Solution) -> Likelier | None:
     count = len(compared.use)
     if count <= compared.design.shape[1]:
         return None
-    sets = sure.equations.table.sets
+    sets = compared.sets
     trials = {
         (i, words): compared.at_once(compared.residual(i, other)) + _volume(given, other)
         for i, given in enumerate(sets)

@@ -18,6 +18,7 @@ from pkmcal.statistics.linear_fit import triangle
 _FTOL = 1e-10  # of the cost: 1e-4 of a standard deviation; rounding moves it by less
 _TOLERANCES = {"ftol": _FTOL, "xtol": 1e-10, "gtol": 1e-15}
 _MOST = 200  # evaluations
+_BARRED = 5  # steps that rows bar, from which on a search walks in steps too small to arrive
 _CONVERGED = (1, 2, 3, 4)  # as MINPACK says it
 
 Function = Callable[[FloatArray], FloatArray]
@@ -25,6 +26,14 @@ Function = Callable[[FloatArray], FloatArray]
 
 class SingularError(FitError):
     """A search came to parameters with which the machine is singular in some pose."""
+
+
+class _BarredError(Exception):
+    """Rows bar the way of a search again and again."""
+
+    def __init__(self, trail: Trail, blocks: BoolArray) -> None:
+        super().__init__()
+        self.trail, self.blocks = trail, blocks  # so far, and the blocks (B,) of these rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,25 +203,49 @@ class Search:
         """Return the place of least cost from `u` (n,) on, and the trail there.
 
         Rows that the machine cannot reach bar the way of a step. Where that happened, the search
-        goes round: first without those rows, then from there with all of them.
+        goes round: first without those rows, then from there with all of them. Where it happens
+        again and again, it does so before it is at an end, and goes on only if that leads nowhere.
 
         `noise` (G,) is as in `Whitening`; `pins` (d, n) are rows that hold the combinations that
         measurements and prior do not identify.
         """
         everything = np.zeros(len(self.equations.blocks.components), dtype=bool)
-        trail, straight, cost, barred = self._minimum(trail, u, noise, loss, pins, everything)
+        try:
+            found = self._minimum(trail, u, noise, loss, pins, everything, _BARRED)
+        except _BarredError as error:
+            begun = replace(trail, evaluations=error.trail.evaluations)
+            trail, around, other = self._around(begun, u, noise, loss, pins, error.blocks)
+            if trail.converged and np.isfinite(other):
+                return around, trail
+            begun = replace(begun, evaluations=trail.evaluations)
+            found = self._minimum(begun, u, noise, loss, pins, everything)
+        trail, straight, cost, barred = found
         if not barred.any() or barred.all():
             return straight, trail
         first = self.at(trail, straight, noise)
-        trail, around, _, _ = self._minimum(first, u, noise, loss, pins, barred)
-        trail = self.at(trail, around, noise)
-        if trail.here.ok:
-            found = self._minimum(trail, around, noise, loss, pins, everything)
-            trail, around, other, _ = found
-            if other < cost:
-                return around, trail
+        trail, around, other = self._around(first, u, noise, loss, pins, barred)
+        if other < cost:
+            return around, trail
         back = replace(first, near=first.here, noise=noise, u=straight)
         return straight, replace(back, evaluations=trail.evaluations, history=trail.history)
+
+    def _around(
+        self,
+        first: Trail,
+        u: FloatArray,
+        noise: FloatArray,
+        loss: Loss,
+        pins: FloatArray,
+        barred: BoolArray,
+    ) -> tuple[Trail, FloatArray, float]:
+        """A minimum with all blocks, found from that without some; cost inf: it has none."""
+        trail, around, _, _ = self._minimum(first, u, noise, loss, pins, barred)
+        trail = self.at(trail, around, noise)
+        if not trail.here.ok:
+            return trail, around, np.inf
+        everything = np.zeros_like(barred)
+        trail, around, cost, _ = self._minimum(trail, around, noise, loss, pins, everything)
+        return trail, around, cost
 
     def _minimum(
         self,
@@ -222,15 +255,17 @@ class Search:
         loss: Loss,
         pins: FloatArray,
         aside: BoolArray,
+        most: int = _MOST,
     ) -> tuple[Trail, FloatArray, float, BoolArray]:
         """A minimum of the cost of the blocks not set aside, the cost, and the blocks in its way.
 
-        Those are the blocks (B,) of rows that some step could not reach.
+        Those are the blocks (B,) of rows that some step could not reach. `_BarredError`: `most`
+        steps could not be taken.
         """
         equations = self.equations
         without = np.repeat(aside, equations.blocks.components)
         last: tuple[Evaluation, FloatArray] | None = None
-        refused = np.zeros_like(aside)
+        refused, times = np.zeros_like(aside), 0
 
         def data(evaluation: Evaluation) -> FloatArray:
             nonlocal last
@@ -249,13 +284,16 @@ class Search:
         count = rows + len(self._stated) + len(pins) + 1
 
         def residual(u: FloatArray) -> FloatArray:
-            nonlocal trail
+            nonlocal trail, times
             trail = self.at(trail, u, noise)
             evaluation = trail.here
             if not evaluation.ok:
                 missed = (evaluation.status[equations.blocks.pose_of_block] != 0) & ~aside
                 if missed.any():  # worse than any step that is taken
                     refused[missed] = True
+                    times += 1
+                    if times == most and not refused.all():
+                        raise _BarredError(trail, refused)
                     return np.full(count, worse + floor)
             turned = np.zeros(rows)
             turned[0] = np.linalg.norm(loss.residual(data(evaluation)))

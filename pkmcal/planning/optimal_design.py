@@ -86,7 +86,7 @@ class Design:
         self._prior = (prior @ unit).T @ (prior @ unit)
         metric = unit.T @ unit  # of the scaled parameters
         self._ridge = metric / worst**2
-        aimed = (aims @ unit).reshape(-1, rank)
+        aimed = _times(aims, unit).reshape(-1, rank)
         self._errors = aimed.T @ aimed / len(aims)
         self._cost = metric if criterion == "A" else self._errors
         self._coarse = self._blocks.reshape(-1, rank).astype(np.float32)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal.arguments import word, words
-from pkmcal.arrays import BoolArray, FloatArray, IntArray
+from pkmcal.arrays import BoolArray, FloatArray, IntArray, lots
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.free_parameters import parameters
@@ -35,6 +35,7 @@ Unknown = Literal["frame", "target"]
 UNKNOWN: tuple[Unknown, ...] = ("frame", "target")
 
 _MANY = 12  # equations of a pose, such as a picture has
+_TOGETHER = 1024  # targets of which derivatives are made at once, as many as caches hold
 _NOTHING = 1e-12  # share of what the most telling direction is told, that is rounding
 _UNIDENTIFIABLE = 1e-3  # mm a target moves per mm along an unidentifiable combination
 
@@ -260,14 +261,11 @@ def design_of(
     `there` (p, n) is what rows that are measured already bring. Errors count along `direction`
     (1, 3) alone, where one is stated.
     """
-    k = len(chosen.places)
-    machines = [under(chosen.robot, load) for load in loads]
-    twists = np.concatenate([machine.error_twists(aims, aims_at) for machine in machines])
+    aimed = np.concatenate([_aimed(chosen, load, aims, aims_at) for load in loads])
     aims = np.tile(aims, (len(loads), 1))
-    by_geometry = twists[:, 3:, chosen.places] * chosen.scale[:k]
-    aimed = np.concatenate([by_geometry, np.zeros((len(aims), 3, len(chosen) - k))], axis=2)
     along = np.eye(3) if direction is None else direction
-    aimed = along @ aimed
+    if direction is not None:
+        aimed = direction @ aimed
     if not np.isfinite(blocks).all() or not np.isfinite(aimed).all():
         raise ArgumentError(
             "candidates or targets: one is singular, where nothing holds the platform"
@@ -301,6 +299,18 @@ def design_of(
         f"candidates: not even all of them identify {unknown}, which moves the targets;"
         " offer others, free fewer parameters or state a prior"
     )
+
+
+def _aimed(
+    chosen: Parameters, load: Load | None, aims: FloatArray, aims_at: FloatArray
+) -> FloatArray:
+    """Return the derivatives of targets (T, 3, n) by the scaled parameters, under a load."""
+    k, machine = len(chosen.places), under(chosen.robot, load)
+    found = np.zeros((len(aims), 3, len(chosen)))
+    for some in lots(len(aims), _TOGETHER):
+        twists = machine.error_twists(aims[some], aims_at[some])
+        np.multiply(twists[:, 3:, chosen.places], chosen.scale[:k], out=found[some, :, :k])
+    return found
 
 
 def _rigid_motions(points: FloatArray) -> FloatArray:
