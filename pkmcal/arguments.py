@@ -1,4 +1,7 @@
-"""Single arguments of public calls: as they are wanted, or an error that names them."""
+"""Single arguments of public calls: as they are wanted, or an error that names them.
+
+Without NumPy, whose numbers are `numbers.Real`: who serves the window computes nothing.
+"""
 
 from __future__ import annotations
 
@@ -10,10 +13,9 @@ import sys
 import warnings
 from collections.abc import Callable, Collection, Iterable
 from concurrent.futures import Executor
+from numbers import Integral, Real
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar, cast
-
-import numpy as np
 
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 
@@ -69,19 +71,19 @@ def number(name: str, value: object, least: float = -math.inf, above: float = -m
     ValueError
         Not finite, or too small.
     """
-    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
+    if isinstance(value, bool) or not isinstance(value, Real):
         raise ArgumentTypeError(f"{name} must be a number, found {shown(value)}")
-    if isinstance(value, np.floating):  # limits are not numbers of lower precision
-        value = float(value)
-    if not abs(value) <= sys.float_info.max:
+    # limits are not numbers of lower precision
+    size: int | float = value if isinstance(value, int) else float(value)
+    if not abs(size) <= sys.float_info.max:
         raise ArgumentError(f"{name} must be finite, found {shown(value)}")
-    if not value >= least:
-        raise ArgumentError(f"{name} must be {least:g} or more, found {value}")
-    if not value > above:
-        raise ArgumentError(f"{name} must be above {above:g}, found {value}")
-    if above == 0.0 and not 1.0 / _SQUARED <= value <= _SQUARED:
-        raise ArgumentError(f"{name} must be from 1e-150 to 1e150, found {value}")
-    return float(value)
+    if not size >= least:
+        raise ArgumentError(f"{name} must be {least:g} or more, found {size}")
+    if not size > above:
+        raise ArgumentError(f"{name} must be above {above:g}, found {size}")
+    if above == 0.0 and not 1.0 / _SQUARED <= size <= _SQUARED:
+        raise ArgumentError(f"{name} must be from 1e-150 to 1e150, found {size}")
+    return float(size)
 
 
 def whole(name: str, value: object, least: int, most: float = math.inf, note: str = "") -> int:
@@ -92,7 +94,7 @@ def whole(name: str, value: object, least: int, most: float = math.inf, note: st
     ValueError
         Anything else.
     """
-    counted = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    counted = isinstance(value, Integral) and not isinstance(value, bool)
     if counted and cast(int, value) > sys.maxsize:
         most = min(most, sys.maxsize)
     if not counted or not least <= cast(int, value) <= most:
@@ -161,7 +163,8 @@ def flag(name: str, value: object) -> bool:
     TypeError
         Anything else.
     """
-    if not isinstance(value, bool | np.bool_):
+    truths = bool | sys.modules["numpy"].bool_ if "numpy" in sys.modules else bool
+    if not isinstance(value, truths):
         raise ArgumentTypeError(f"{name} must be True or False, found {shown(value)}")
     return bool(value)
 
@@ -241,7 +244,7 @@ def checked_seed(seed: int) -> int:
     ValueError
         It is no whole number from 0 to 2⁶⁴ - 1.
     """
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or not 0 <= seed < 2**64:
+    if isinstance(seed, bool) or not isinstance(seed, Integral) or not 0 <= seed < 2**64:
         raise ArgumentError(f"seed must be a whole number from 0 to 2**64 - 1, found {seed!r}")
     return int(seed)
 

@@ -220,7 +220,9 @@ def _for_sets(option: str, given: Sequence[T], job: Calibration, sources: Source
     """Return the words of each file, for each set of measurements."""
     if len(given) != len(job.files):
         what = "names" if option == "--session" else "words"
-        raise ArgumentError(f"{option}: {len(given)} {what} for {len(job.files)} files")
+        raise ArgumentError(
+            f"{option} {','.join(map(str, given))}: {len(given)} {what} for {len(job.files)} files"
+        )
     return [given[k] for k in sources.file_of]
 
 

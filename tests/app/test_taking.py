@@ -94,4 +94,4 @@ def test_what_is_neither_is_refused_by_name(folder: Path, name: str) -> None:
 
 def test_a_lens_and_columns_go_to_the_reading(folder: Path) -> None:
     reading = taken(Project(), ["lens.yaml", "columns.toml"]).project.calibration.reading
-    assert (reading.camera, reading.columns) == ("lens.yaml", "columns.toml")
+    assert (reading.camera, reading.columns) == (("lens.yaml",), "columns.toml")

@@ -111,7 +111,7 @@ def test_files_of_the_same_name_are_told_apart_by_their_folders(
 
 def test_what_does_not_fit_is_refused(refused: Callable[..., str], files: list[Path]) -> None:
     said = refused("calibrate", "hexapod", *files, *FREE, "--session", "a")
-    assert said == "--session: 1 names for 2 files"
+    assert said == "--session a: 1 names for 2 files"
     said = refused("calibrate", "hexapod", *files, *FREE, "--per-session", "ofset*")
     assert said.startswith("per_session: no free parameter matches 'ofset*'; did you mean 'offset")
     Path("own.csv").write_text("q1 [mm],session\n1,a\n")
