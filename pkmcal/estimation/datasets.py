@@ -20,6 +20,8 @@ from pkmcal.estimation.starts import with_starts
 from pkmcal.estimation.tensioned_poses import unknown_tensions
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.calibratable import Calibratable
+from pkmcal.kinematics.pose_steps import surplus
+from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
 
 Said = Mapping[str, Known | Sequence[Known]]  # of "frame", "target" and "attachment"
@@ -79,19 +81,22 @@ def _require_one_frame(datasets: Sequence[FitData]) -> None:
 
 
 def informative(machine: Calibratable, datasets: list[FitData]) -> tuple[list[FitData], int]:
-    """Leave rows out that say nothing: unread, where poses follow from the actuators exactly.
+    """Leave rows out that say nothing, and count them.
 
-    And count them.
+    Those are rows of which nothing was read, where actuators are no more than closures need: the
+    pose takes whatever they read. Rows of one `group` have a pose that another one may tell.
     """
     sets = [data.measured for data in datasets]
     if unknown_tensions(machine, sets):
         return datasets, 0
     sigmas = [measured.actuator_sigma for measured in sets]
     equations = has_equations(machine, sigmas, tells_actuators(sets))
+    spare = isinstance(machine, Robot) and surplus(machine) > 0
     kept, unread = [], 0
     for data in datasets:
         values = data.measured.values.reshape(len(data.measured), -1)
-        if equations and not data.measured.instrument.tells_actuators:
+        told = spare or data.measured.group is not None
+        if equations and told and not data.measured.instrument.tells_actuators:
             kept.append(data)
             continue
         read = np.asarray(np.isfinite(values).any(axis=1))

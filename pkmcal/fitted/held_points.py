@@ -69,7 +69,8 @@ class Points:
     """Equations (M,) of the points held out, in mm; angles as their arcs.
 
     Residuals and design, what considered numbers make of them, the variance of a reading and of
-    what actuators add to it in mm², the share of each that numbers of its own session took, the
+    what actuators add to it in mm² and by which of them (M, n), the square roots of the parts with
+    their signs, the share of each that numbers of its own session took, the
     number of its unit, the fitted set that each is like and the number of its family there; and
     the units. Variances are NaN where the fit shows none of that family.
     """
@@ -79,6 +80,7 @@ class Points:
     considered: FloatArray
     reading: FloatArray
     by_actuators: FloatArray
+    by_actuator: FloatArray
     taken: FloatArray
     unit: IntArray
     like: IntArray
@@ -124,7 +126,7 @@ def points(
 ) -> Points:
     """The equations at the solution."""
     present, arcs = equations.whitening.present, equations.arcs
-    variances, added, families, per_mm = [], [], [], []
+    variances, moves, families, per_mm = [], [], [], []
     seen = equations.prediction.predicted(after)
     for i, measured in enumerate(equations.table.sets):
         count, k = after.residuals[i].shape
@@ -137,10 +139,8 @@ def points(
         moved = seen[i].by_twist @ after.machines.actuator_twists(
             after.states, equations.table.pose_of[i]
         )
-        part = (
-            np.zeros((count, k)) if sigma is None else ((moved * sigma[:, None]) ** 2).sum(axis=2)
-        )
-        added.append(arcs[i] ** 2 * part)
+        part = np.zeros((count, k, 0)) if sigma is None else moved * sigma[:, None]
+        moves.append((arcs[i][:, None] * part).reshape(count * k, -1))
     jacobian = np.concatenate([
         (arc[:, None] * part).reshape(-1, part.shape[2])
         for arc, part in zip(arcs, equations.jacobian(after), strict=True)
@@ -152,7 +152,9 @@ def points(
     def stacked(parts: Sequence[FloatArray]) -> FloatArray:
         return np.concatenate([part.ravel() for part in parts])[present]
 
-    by_sigma, taken, arc = stacked(added), np.zeros(len(by_all)), stacked(per_mm)
+    most = max(part.shape[1] for part in moves)
+    by_each = np.concatenate([np.pad(p, ((0, 0), (0, most - p.shape[1]))) for p in moves])[present]
+    by_sigma, taken, arc = (by_each**2).sum(axis=1), np.zeros(len(by_all)), stacked(per_mm)
     if own is not None:
         by_own = by_all[:, rows.own]
         by_fitted += by_own @ own.follow
@@ -167,6 +169,7 @@ def points(
         considered=considered_errors(rows, equations, after, uncertainty, by_fitted @ back),
         reading=stacked(variances),
         by_actuators=by_sigma,
+        by_actuator=by_each,
         taken=taken,
         unit=np.concatenate(
             [np.tile([units.index(unit) for unit in m.units], len(m)) for m in equations.table.sets]
@@ -232,7 +235,11 @@ def odd_rows(points: Points, row: IntArray, count: int, uncertainty: Uncertainty
     if not uncertainty.known or not len(row):
         return odd
     freedom = uncertainty.fit.freedom if uncertainty.fit.freedom >= FEW else np.inf
+    for _, mine in _each_unit(points):
+        freedom = min(freedom, _freedom_of_noise(points, mine, uncertainty))
+    together = points.by_actuator * np.sqrt(1.0 - points.taken)[:, None]
     own = _floored(points)
+    alone = np.maximum(own - (together**2).sum(axis=1), _NOTHING * own)
     some = np.flatnonzero(points.known)
     order = some[np.argsort(row[some], kind="stable")]
     lengths = np.bincount(row[some], minlength=count)
@@ -242,7 +249,8 @@ def odd_rows(points: Points, row: IntArray, count: int, uncertainty: Uncertainty
         mine = order[first[alike, None] + np.arange(k)]
         design, residual = whole[mine], points.residual[mine]
         variance = design @ covariance @ design.transpose(0, 2, 1)
-        variance += np.eye(k) * own[mine][:, :, None]
+        variance += np.eye(k) * alone[mine][:, :, None]
+        variance += together[mine] @ together[mine].transpose(0, 2, 1)
         along = np.linalg.solve(variance, residual[:, :, None])[:, :, 0]
         squares = np.nan_to_num((residual * along).sum(axis=1), posinf=_HUGE)
         chances = [f_tail(min(each / k, _HUGE), k, freedom) for each in squares.tolist()]
@@ -312,13 +320,11 @@ def _test(
         numbered(named.pose[good]),
         named.component[good],
     )
-    # rows at the same actuators have their errors in common
-    total, shared = split
-    common = shared + float(np.mean(points.by_actuators[good] / own)) * total
-    of_held = total, min(common, total)
+    left = np.sqrt(1.0 - points.taken[good]) / unit
+    by_actuator = points.by_actuator[good] * left[:, None]
     taken = float(points.taken[good].mean())
     most = _freedom_of_noise(points, good, uncertainty)
-    return holdout_test(fitted, held, split, covariance, of_held, taken, most)
+    return holdout_test(fitted, held, split, covariance, by_actuator, taken, most)
 
 
 def _freedom_of_noise(points: Points, good: BoolArray, uncertainty: Uncertainty) -> float:

@@ -105,7 +105,7 @@ def holdout_test(
     held: Lengths,
     split: Noise,
     covariance: FloatArray,
-    of_held: Noise | None = None,
+    in_common: FloatArray | None = None,
     taken: float = 0.0,
     most: float = np.inf,
 ) -> HoldoutTest:
@@ -119,8 +119,9 @@ def holdout_test(
         Variance of the errors of both, and what those of a pose share of it: see `noise`.
     covariance : ndarray (p, p)
         Of the parameters in the basis of the fit, in the unit of `held`.
-    of_held : (float, float), optional
-        That of `held`, where its errors share another part of the same variance.
+    in_common : ndarray (M, n), optional
+        What errors that all equations of a pose have in common, such as those of n actuators, add
+        to each of `held`, in standard deviations with their signs.
     taken : float
         Share of the equations of `held` that numbers found from these took.
     most : float
@@ -130,7 +131,7 @@ def holdout_test(
         np.einsum("ij,jk,ik->", held.design, covariance, held.design)
     ) / len(held.residual)
     ratio = float(np.sqrt(np.mean(held.residual**2) / expected))
-    first = _of_sum(held, of_held or split, covariance) * (1.0 - taken)
+    first = _of_sum(held, split, covariance, in_common) * (1.0 - taken)
     second = min(_of_residuals(fitted, split), most)
     poses = np.bincount(fitted.pose)
     squares = np.bincount(fitted.pose, fitted.residual**2)[poses > 0] / poses[poses > 0]
@@ -144,8 +145,12 @@ def holdout_test(
     return HoldoutTest(ratio, median, f_tail(ratio**2, first, second), (first, second))
 
 
-def _of_sum(held: Lengths, split: Noise, covariance: FloatArray) -> float:
+def _of_sum(
+    held: Lengths, split: Noise, covariance: FloatArray, in_common: FloatArray | None
+) -> float:
     """Degrees of freedom of the sum of squares of the points held out."""
+    if in_common is not None and in_common.any():
+        return _of_sum_in_common(held, split[0], covariance, in_common)
     key = numbered(held.pose, held.component)
     counts = np.bincount(key).astype(np.float64)
     design, pulls = held.design, sums(held.design, key)
@@ -162,6 +167,25 @@ def _of_sum(held: Lengths, split: Noise, covariance: FloatArray) -> float:
         + float(np.trace(covariance @ inner @ covariance @ inner))
     )
     return trace**2 / square
+
+
+def _of_sum_in_common(
+    held: Lengths, total: float, covariance: FloatArray, in_common: FloatArray
+) -> float:
+    """`_of_sum` where all equations of a pose have errors in common, of which each has its part."""
+    own = np.maximum(1.0 - (in_common**2).sum(axis=1), 0.0)
+    shape = int(held.pose.max()) + 1, in_common.shape[1]
+    squares = np.zeros((*shape, shape[1]))
+    np.add.at(squares, held.pose, in_common[:, :, None] * in_common[:, None, :])
+    pulls = np.zeros((*shape, held.design.shape[1]))
+    np.add.at(pulls, held.pose, in_common[:, :, None] * held.design[:, None, :])
+    inner, m = held.design.T @ held.design, len(held.residual)
+    mixed = held.design.T @ (own[:, None] * held.design) + np.einsum("pni,pnj->ij", pulls, pulls)
+    noise = float((own**2).sum() + 2.0 * (own @ (in_common**2).sum(axis=1)) + (squares**2).sum())
+    moved = covariance @ inner
+    trace = m * total + float(np.trace(moved))
+    square = total**2 * noise + 2.0 * total * float(np.trace(covariance @ mixed))
+    return trace**2 / (square + float(np.trace(moved @ moved)))
 
 
 def _of_residuals(fitted: Lengths, split: Noise) -> float:

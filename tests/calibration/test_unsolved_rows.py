@@ -47,3 +47,19 @@ def test_rows_without_a_solution_at_the_end_are_named(
     listed = ", ".join(str(row) for row in sorted(rows))
     with pytest.raises(pk.ArgumentError, match=rf"^{len(rows)} of .*rows {listed}\).* where the"):
         pk.identify(robot, data, free)
+
+
+@pytest.mark.parametrize("sigma", [None, 0.02])
+def test_a_row_of_which_nothing_was_read_takes_no_part(sigma: float | None) -> None:
+    """Also one that the machine cannot reach, beside actuators of stated deviation."""
+    robot = pk.load("hexapod")
+    data = replace(measured(robot), actuator_sigma=sigma)
+    q, values = data.actuators.copy(), data.values.copy()
+    q[3, 0] += 400.0
+    assert not robot.forward(q[3]).ok
+    values[3] = np.nan
+    with_it = pk.identify(
+        robot, replace(data, actuators=q, values=values), robot.geometry.names[:2]
+    )
+    without = pk.identify(robot, data.select(np.arange(len(data)) != 3), robot.geometry.names[:2])
+    assert with_it.values.tobytes() == without.values.tobytes()

@@ -140,3 +140,26 @@ def test_a_few_gross_points_are_named_not_taken_for_a_shift() -> None:
         found.append(compared(design, 30, y)[0])
     assert all(test.few_off for test in found)
     assert np.mean([test.contradicts for test in found]) <= 0.15  # by chance of the median
+
+
+@pytest.mark.parametrize("share", [0.2, 0.7, 0.98])
+def test_errors_that_a_pose_has_in_common_take_degrees_of_freedom(share: float) -> None:
+    """Those of actuators, say: as many as a sum of squares of drawn errors has, by its variance."""
+    rng = np.random.default_rng(int(100 * share))
+    poses, k, n, p = 12, 3, 6, 5
+    pose = np.repeat(np.arange(poses), k)
+    moved = rng.normal(size=(poses, k, n)) * [3, 2, 1, 0.3, 0.1, 0.1]
+    moved *= np.sqrt(share) / np.linalg.norm(moved, axis=2, keepdims=True)
+    design = rng.normal(size=(poses * k, p))
+    half = 0.1 * rng.normal(size=(p, p))
+    many = Lengths(
+        rng.normal(size=6000), np.zeros((6000, p)), np.arange(6000), np.arange(6000) // 30,
+        np.zeros(6000, dtype=np.intp),
+    )  # fmt: skip
+    held = Lengths(rng.normal(size=poses * k), design, pose, pose, np.tile(np.arange(k), poses))
+    test = holdout_test(many, held, (1.0, 0.0), half @ half.T, moved.reshape(-1, n))
+    runs = 20_000
+    common = np.einsum("pki,rpi->rpk", moved, rng.normal(size=(runs, poses, n))).reshape(runs, -1)
+    own = np.sqrt(1.0 - share) * rng.normal(size=(runs, poses * k))
+    squares = ((common + own + rng.normal(size=(runs, p)) @ half.T @ design.T) ** 2).sum(axis=1)
+    assert test.freedom[0] == pytest.approx(2.0 * squares.mean() ** 2 / squares.var(), rel=0.05)
