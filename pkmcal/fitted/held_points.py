@@ -140,7 +140,7 @@ def points(
             after.states, equations.table.pose_of[i]
         )
         part = np.zeros((count, k, 0)) if sigma is None else moved * sigma[:, None]
-        moves.append((arcs[i][:, None] * part).reshape(count * k, -1))
+        moves.append((arcs[i][:, None] * part).reshape(count * k, part.shape[2]))
     jacobian = np.concatenate([
         (arc[:, None] * part).reshape(-1, part.shape[2])
         for arc, part in zip(arcs, equations.jacobian(after), strict=True)
