@@ -58,6 +58,16 @@ def signature_of_class(
     return None
 
 
+def names_of_files(app: Any, page: str, source: list[str]) -> None:
+    """Show above a block the name of the file that it is: ```` ```toml mine.toml ````."""
+    source[0] = re.sub(
+        r"^```(toml|text) (\S+)$",
+        r"```{code-block} \1\n:caption: \2\n",
+        source[0],
+        flags=re.MULTILINE,
+    )
+
+
 def pages_of_machines(app: Any, error: Exception | None) -> None:
     """Write the page of each machine of the gallery, which its picture opens."""
     if error is None and app.builder.format == "html":
@@ -69,6 +79,7 @@ def pages_of_machines(app: Any, error: Exception | None) -> None:
 
 
 def setup(app: Any) -> None:
-    """Connect to Sphinx, before numpydoc looks at signatures, and when all pages are written."""
+    """Connect to Sphinx: to pages as they are read, to signatures before numpydoc, to the end."""
     app.connect("autodoc-process-signature", signature_of_class, priority=400)
+    app.connect("source-read", names_of_files)
     app.connect("build-finished", pages_of_machines)

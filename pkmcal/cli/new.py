@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Annotated
@@ -23,7 +24,7 @@ from pkmcal.report.as_json import as_json
 
 _HEAD = """\
 # Made by `pkmcal new {name}`. Change what differs on your machine, measure it, run
-#     pkmcal calibrate {name}.toml measured.csv --report report
+#     pkmcal calibrate {file} measured.csv --report report
 #
 """
 _PARALLEL = """\
@@ -101,8 +102,8 @@ def new(
 
     Example: pkmcal new linear-delta my-printer.toml
     """
-    text = template(machine)
     path = Path(f"{machine}.toml") if file is None else file
+    text = template(machine, path.name)
     if os.path.lexists(path):  # a link that leads nowhere, too
         raise ArgumentError(f"{path} exists already; name another file")
     write_whole(path, text)
@@ -113,13 +114,15 @@ def new(
     return 0
 
 
-def template(machine: str) -> str:
+def template(machine: str, file: str = "robot.toml") -> str:
     """The text of a robot file that loads as the built-in machine.
 
     Parameters
     ----------
     machine : str
         A name of `pkmcal.machines`.
+    file : str
+        What the file is called, for the command in its first lines.
 
     Raises
     ------
@@ -137,7 +140,8 @@ def template(machine: str) -> str:
     content, place, _ = robot_file.located(machine)
     text, data = content.decode(), Source(content, place).data
     keys = _ARM if is_arm(data) else _PARALLEL + _of_limbs(data["limb"])
-    return f"{_HEAD.format(name=machine)}{keys}#\n{text}"
+    called = shlex.quote(file) if file.isprintable() else "FILE"  # a line stays a line
+    return f"{_HEAD.format(name=machine, file=called)}{keys}#\n{text}"
 
 
 def _of_limbs(limbs: Sequence[dict[str, object]]) -> str:

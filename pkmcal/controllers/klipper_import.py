@@ -67,6 +67,8 @@ def of_klipper(path: str | PathLike[str]) -> Stored:
         about = About(where.stem, _LINEAR_HEAD.format(file=where.name), probe, controller)
         rods = heights is not None and distances is not None
         text = linear_delta.text_of(delta, steps, about, bed=_bed(printer), rods=rods)
+    if heights is None:
+        unread = (*unread, "DELTA_CALIBRATE, then SAVE_CONFIG, store heights in it")
     return Stored(text, heights, distances, (*notes, *unread))
 
 

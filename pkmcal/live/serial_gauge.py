@@ -85,7 +85,7 @@ def _opened(port: str, baud: int) -> Any:
     try:
         import serial
     except ImportError:
-        raise ArgumentError("serial: needs pyserial: pip install 'pkmcal[live]'") from None
+        raise ArgumentError("serial: needs pyserial: pip install pyserial") from None
     try:
         return serial.Serial(port, baud, exclusive=True)
     except (OSError, ValueError) as error:

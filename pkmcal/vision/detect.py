@@ -169,7 +169,7 @@ def detect(
     ------
     ValueError
         No pictures, two of one name, a board that cannot be found, or OpenCV is not installed
-        (``pip install 'pkmcal[vision]'``).
+        (``pip install opencv-python-headless``).
     OSError
         A file cannot be read.
     """

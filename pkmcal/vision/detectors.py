@@ -59,7 +59,7 @@ def opencv() -> Any:
         return import_module("cv2")
     except ImportError:
         raise ArgumentError(
-            "boards in pictures take OpenCV 4.8 or later: pip install 'pkmcal[vision]'"
+            "boards in pictures take OpenCV 4.8 or later: pip install opencv-python-headless"
         ) from None
 
 

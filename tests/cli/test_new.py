@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shlex
 from pathlib import Path
 from typing import Any
 
@@ -47,6 +48,15 @@ def test_every_key_that_a_limb_may_have_is_explained(name: str) -> None:
     kinds = [KINDS[limb.kind] for limb in pk.load(name).model.limbs]
     keys = {key for kind in kinds for key in kind.keys()}  # noqa: SIM118
     assert {key for key in keys if not key.endswith("_tilt")} <= explained
+
+
+def test_command_in_the_file_names_the_file(run: Any, tmp_path: Path) -> None:
+    for name in ("mine.toml", "two words.toml", "line\nbreak.toml"):
+        assert run("new", "3r", str(tmp_path / name)).exit_code == 0
+        told = (tmp_path / name).read_text("utf-8").splitlines()[1].partition(" measured.csv")[0]
+        named = shlex.split(told.removeprefix("#"))
+        assert named == ["pkmcal", "calibrate", name if name.isprintable() else "FILE"]
+        assert len(pk.load(tmp_path / name).axes) == 3
 
 
 def test_lines_are_short_enough_to_read() -> None:

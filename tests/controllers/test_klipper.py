@@ -198,6 +198,14 @@ def test_characters_that_end_no_line_do_not_and_a_mark_stays(tmp_path: Path) -> 
     assert new.startswith(text[:40])
 
 
+def test_a_file_without_heights_says_what_stores_them(tmp_path: Path) -> None:
+    """No `probe.csv` is written, which the next command of its owner would name."""
+    for text, missing in ((OWN, False), (OWN.partition("\n#*#")[0], True)):
+        printer = pk.import_printer(own(tmp_path, text))
+        assert (printer.measurements is None) == missing
+        assert any("SAVE_CONFIG" in note for note in printer.notes) == missing
+
+
 def test_included_files_are_read_where_they_are_named_and_never_written(tmp_path: Path) -> None:
     file = own(tmp_path, OWN.replace("\n[printer]", "\n[include towers/*.cfg]\n[printer]", 1))
     (tmp_path / "towers").mkdir()

@@ -30,7 +30,8 @@ PAGES = [
     *sorted((ROOT / "benchmarks").rglob("*.md")),
 ]
 DATA = ROOT.parent / "shared" / "data"
-LOGS = {  # measurements that are no part of the project, by the names the pages give them
+LOGS = {  # what readers have of their own, by the names the pages give it
+    "printer.cfg": ROOT / "examples" / "linear-delta" / "printer.cfg",
     "probe41.csv": DATA / "linear-delta" / "probe41.csv",
     "tracker.csv": DATA / "fanuc-r2000ic" / "tracker.csv",
 }
