@@ -44,6 +44,9 @@ class Solvable(Protocol):
     def of_rows(self, rows: IntArray) -> Solvable:
         """The arm in the state that it has in some rows of a call."""
 
+    def require_loads_of(self, rows: int) -> None:
+        """Refuse rows that are not as many as the loads at the tool."""
+
     def forward(self, theta: ArrayLike, joint_errors: ArrayLike | None = None) -> FloatArray:
         """Return the tool's frame, (..., 4, 4)."""
 
@@ -120,6 +123,7 @@ def damped_least_squares(
     word("parts", parts, PARTS)
     rows, shape = screw.as_motions("target", target)
     goal = rows.reshape(-1, 4, 4)
+    arm.require_loads_of(len(goal))
     n = arm.n_joints
     theta = np.zeros((len(goal), n))
     if guess is not None:

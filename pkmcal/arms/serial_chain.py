@@ -325,6 +325,12 @@ class SerialChain:
             return self
         return self._like(_laws=laws)
 
+    def require_loads_of(self, rows: int) -> None:
+        """Refuse rows that are not as many as the loads at the tool, where these are several."""
+        carried = None if self._laws is None else self._laws.pulls.carried
+        if carried is not None and carried.weight.ndim > 1 and len(carried.weight) != rows:
+            raise ArgumentError(f"load is of {len(carried.weight)} rows, but {rows} were asked for")
+
     # --------------------------------------------------------------------------------------------
 
     def _linked(self, joint_errors: ArrayLike | None) -> tuple[FloatArray, Links]:
@@ -351,6 +357,7 @@ class SerialChain:
         self, theta: ArrayLike, joint_errors: ArrayLike | None
     ) -> tuple[FloatArray, tuple[int, ...], Links]:
         rows, shape = as_rows("theta", theta, self.n_joints)
+        self.require_loads_of(len(rows))
         if joint_errors is None:
             return rows, shape, self._links
         errors = checked_errors(joint_errors, self.n_joints, shape)

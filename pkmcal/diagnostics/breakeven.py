@@ -23,6 +23,8 @@ from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.statistics.linear_fit import column_basis
 
 _KINDS = ("mm", "rad", "1")
+_NOTHING = 1e-9  # share of the largest motion by a number of its unit: less is rounding
+_MOST = {"mm": 0.02, "rad": 0.02, "1": 0.02}  # of the machine's length, rad, and of a ratio
 _REDUNDANT = 1e-6  # share of a number's motion that no free number has, below which it is one
 
 
@@ -55,7 +57,8 @@ class Breakeven:
 def breakeven(fit: Fit) -> tuple[Breakeven, ...]:
     """Return the errors of held numbers that double ±: lengths, angles and ratios.
 
-    Nothing where equations are mixtures or the noise is not known.
+    Nothing where equations are mixtures or the noise is not known, and nothing of numbers that
+    would have to be wrong by more than machines are.
     """
     sure, chosen = fit.uncertainty, fit.parameters
     if not sure.known or sure.mixed or not len(chosen.places):
@@ -66,13 +69,14 @@ def breakeven(fit: Fit) -> tuple[Breakeven, ...]:
         return ()
     follow = sum(sure.fit.back @ (sure.fit.design[rows].T @ some) for rows, some in held.columns())
     total = float(np.trace(sure.scaled))
+    most = _MOST | {"mm": _MOST["mm"] * chosen.robot.length}
     found = []
     for unit in _KINDS:
         mine = [i for i, own in enumerate(held.units) if own == unit]
         moved = float((follow[:, mine] ** 2).sum())
-        if moved > 0.0:
+        if moved > 0.0 and (wrong := float(np.sqrt(3.0 * total / moved))) <= most[unit]:
             kinds = dict.fromkeys(re.sub(r"[0-9].*", "*", held.names[i]) for i in mine)
-            found.append(Breakeven(tuple(kinds), unit, float(np.sqrt(3.0 * total / moved))))
+            found.append(Breakeven(tuple(kinds), unit, wrong))
     return tuple(found)
 
 
@@ -81,8 +85,8 @@ def in_words(found: tuple[Breakeven, ...]) -> str:
     if not found:
         return ""
     return (
-        f"± double if {', or '.join(map(str, found))}: numbers that are not free count as exact;"
-        " state --uncertainty (uncertainty=) if they may be wrong by as much"
+        f"± double on the whole if {', or '.join(map(str, found))}: numbers that are not free count"
+        " as exact; state --uncertainty (uncertainty=) if they may be wrong by as much"
     )
 
 
@@ -100,7 +104,10 @@ def _candidates(fit: Fit, robot: Calibratable) -> list[str]:
     own = [geometry.names.index(name) for name in others]
     twists = _twists(fit)
     size = np.linalg.norm(twists, axis=0)
-    twists = twists / np.where(size > 0.0, size, 1.0)
+    for unit in _KINDS:
+        alike = np.array(geometry.units) == unit
+        size[alike & (size <= _NOTHING * size[alike].max(initial=0.0))] = 0.0
+    twists = np.where(size > 0.0, twists, 0.0) / np.where(size > 0.0, size, 1.0)
     basis = column_basis(twists[:, chosen.places])
     columns = twists[:, own]
     left = np.linalg.norm(columns - basis @ (basis.T @ columns), axis=0)

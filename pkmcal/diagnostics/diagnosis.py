@@ -58,6 +58,11 @@ class Diagnosis:
             level = check.levels[0] if check.level_of is None else check.level_of(found, finding)
             if level is None:
                 continue
+            if level not in check.levels:
+                levels = ", ".join(check.levels)
+                raise ValueError(
+                    f"{check.name}: level_of must say {levels} or None; said {level!r}"
+                )
             text = printable(check.say(found, finding), _LONGEST)
             remedies = () if check.remedies is None else check.remedies(found, finding)
             yield Said(check.name, level, text, finding, remedies)

@@ -153,10 +153,11 @@ class _Compared:
 
 
 def _fills(given: Measurements, other: Measurements) -> bool:
-    """Return whether a column of nothing but 0, which takes no part, would have numbers."""
+    """Return whether a column that takes no part, of 0 or not read, would have numbers."""
     before, after = (m.values.reshape(len(m), -1) for m in (given, other))
     still = (before == 0.0).all(axis=0)
-    return bool(np.any(after[:, still] != 0.0))
+    read = np.isfinite(before)
+    return bool(np.any(after[:, still] != 0.0) or np.any(read != np.isfinite(after)))
 
 
 def likelier_reading(found: Solution) -> Likelier | None:

@@ -13,7 +13,7 @@ from pkmcal.geometry.load import is_of_load
 
 GRAVITY = (0.0, 0.0, -9.80665)  # m/s², in the axes of the base
 COMPLIANCE, PER_LENGTH = "compliance.", ".per_length"
-_GROUPS = (COMPLIANCE, "mass.", "centre.", "payload.", "gravity.", "balancer")
+_GROUPS = ("compliance", "mass.", "centre.", "payload.", "gravity.", "balancer")
 
 
 @dataclass(frozen=True)
@@ -106,5 +106,5 @@ def is_kinematic(name: str) -> bool:
 
 
 def is_elastic(name: str) -> bool:
-    """Return whether a number of the geometry is a compliance, or of what pulls at the machine."""
+    """Return whether a number is a compliance, of limbs or of joints, or of what pulls."""
     return name.startswith(_GROUPS)
