@@ -77,6 +77,8 @@ class Uncertainty:
         How the basis follows numbers that are not fitted along, in their stated deviations.
     noise_share : float
         Of the residuals' variance, what these numbers do not explain.
+    allowed : (LinearFit, ndarray) or None
+        The fit with these numbers fitted along, and residuals of its prior's rows.
     """
 
     labels: Labels
@@ -93,6 +95,7 @@ class Uncertainty:
     information: FloatArray
     considered: FloatArray | None = None
     noise_share: float = 1.0
+    allowed: tuple[LinearFit, FloatArray] | None = None
 
     @property
     def known(self) -> bool:
@@ -122,16 +125,22 @@ class Uncertainty:
         """Covariance (n, n) of the scaled parameters."""
         return self.covariance.of(self.fit.back) + self._beside(self.fit.back)
 
+    @property
+    def tested(self) -> LinearFit:
+        """The fit for tests of the model: without what considered numbers explain of residuals."""
+        return self.fit if self.allowed is None else self.allowed[0]
+
     @cached_property
     def of_own_deviations(self) -> LinearFit:
-        """The fit with each component in units of its own deviation.
+        """The tested fit with each component in units of its own deviation.
 
         Where a stated sigma is right for some of the components and too small for others, tests of
         the linear model take what these miss for what they look for.
         """
         if self.mixed or self.equations.blocks.unstated.all():
-            return self.fit  # where none is stated, they have their own already
-        return _of_own_deviations(self.fit, self.labels, self._place, self.prior_residual)
+            return self.tested  # where none is stated, they have their own already
+        beyond = self.prior_residual if self.allowed is None else self.allowed[1]
+        return _of_own_deviations(self.tested, self.labels, self._place, beyond)
 
     def _beside(self, contrasts: FloatArray) -> FloatArray | float:
         """Return the covariance of contrasts (q, p) by offsets and numbers not fitted."""
