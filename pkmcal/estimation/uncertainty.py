@@ -21,6 +21,7 @@ from pkmcal.statistics.covariance import Covariance, CovarianceRule, covariance
 from pkmcal.statistics.linear_fit import (
     LinearFit,
     in_unit_basis,
+    met_exactly,
     numbered,
     reweighted,
     unit_basis,
@@ -183,6 +184,18 @@ class Uncertainty:
         matrix: FloatArray = self.covariance.by_cluster * self.noise_share + prior
         return matrix
 
+    @cached_property
+    def by_rule(self) -> FloatArray:
+        """Covariance (p, p) in the basis by the rule that ± have.
+
+        The sandwich of few poses is a rough estimate: tests by it find too much.
+        """
+        if self.covariance.rule == "cluster":
+            return self.by_cluster
+        prior = self.fit.prior.T @ self.fit.prior
+        matrix: FloatArray = self.covariance.of(np.eye(len(prior)))
+        return matrix
+
     def in_units(self, whitened: FloatArray) -> FloatArray:
         """Whitened values (M,) in mm, angles as their arcs."""
         parts = self.equations.whitening.unwhiten(whitened, self.factors)
@@ -199,6 +212,19 @@ class Uncertainty:
         """Equations (M,) of set `i` that are lengths."""
         chosen: BoolArray = self.labels.length & (self.labels.set_of == i)
         return chosen
+
+    @cached_property
+    def idle(self) -> BoolArray:
+        """Equations (M,) of components that are met exactly, such as the height of a plane."""
+        if self.mixed:
+            return np.zeros(len(self.fit.residual), dtype=bool)
+        return met_exactly(self.fit.residual, self.fit.component)
+
+    def noise_of_moving(self, i: int, family: int = 0) -> float:
+        """Variance of `noise_of` of the equations that are not idle."""
+        mine = self.family_of(i, family) if family else self.lengths_of(i)
+        share = 1.0 - float(self.idle[mine].mean()) if self.idle.any() else 1.0
+        return self.noise_of(i, family)[0] / (share or 1.0)
 
     def family_of(self, i: int, family: int) -> BoolArray:
         """Equations (M,) of one family of set `i`, by its number there."""

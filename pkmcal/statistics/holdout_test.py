@@ -17,7 +17,7 @@ from pkmcal.statistics.distributions import f_limit, f_tail
 from pkmcal.statistics.linear_fit import numbered, sums
 from pkmcal.statistics.noise import Noise
 
-CHANCE = 0.01  # below which points contradict the fit …
+CHANCE = 0.005  # below which points contradict the fit …
 RATIO = 1.2  # … if their rms and their median are also so much larger than expected
 NEARER = 1e-3  # chance below which they are nearer than expected, of a ratio below 1 / RATIO
 

@@ -87,12 +87,25 @@ class LinearFit:
         Such are angles of a delta in files of its controller, and the height of a plane, which a
         frame that is found meets as well: no noise, and no degrees of freedom.
         """
-        exact = np.abs(self.residual[use]) <= _MET * np.abs(self.residual[use]).max(initial=0.0)
-        count = np.bincount(self.component[use])
-        met = np.bincount(self.component[use], exact) == count
-        idle = exact & (met[self.component[use]] | ~(self.design[use] != 0.0).any(axis=1))
+        met = met_exactly(self.residual[use], self.component[use])
+        still = (self.residual[use] == 0.0) & ~(self.design[use] != 0.0).any(axis=1)
+        idle = met | still
         kept: IntArray = use[~idle]
         return kept
+
+
+def met_exactly(residual: FloatArray, component: IntArray) -> BoolArray:
+    """Mark equations (M,) of components (M,) whose residuals are nothing but rounding errors.
+
+    Examples
+    --------
+    >>> met_exactly(np.array([0.3, 1e-17, -0.2, 0.0]), np.array([0, 1, 0, 1])).tolist()
+    [False, True, False, True]
+    """
+    size = np.abs(residual)
+    open_ones = np.bincount(component, size > _MET * size.max(initial=0.0))
+    met: BoolArray = open_ones[component] == 0.0
+    return met
 
 
 def reweighted(fit: LinearFit, deviations: FloatArray, prior_residual: FloatArray) -> LinearFit:
