@@ -222,9 +222,11 @@ class Uncertainty:
 
     def noise_of_moving(self, i: int, family: int = 0) -> float:
         """Variance of `noise_of` of the equations that are not idle."""
+        total = self.noise_of(i, family)[0]
+        if not self.idle.any():
+            return total
         mine = self.family_of(i, family) if family else self.lengths_of(i)
-        share = 1.0 - float(self.idle[mine].mean()) if self.idle.any() else 1.0
-        return self.noise_of(i, family)[0] / (share or 1.0)
+        return total / ((1.0 - float(self.idle[mine].mean())) or 1.0)
 
     def family_of(self, i: int, family: int) -> BoolArray:
         """Equations (M,) of one family of set `i`, by its number there."""
