@@ -68,7 +68,8 @@ def _uncertainty_contradicted(found: Solution) -> tuple[WrongUncertainty, ...]:
     judged = [each for each in found.nuisances if np.isfinite(each.pull)]
     if test is None or not judged:
         return ()
-    chances = [2.0 * len(judged) * t_tail(abs(each.pull), np.inf) for each in judged]
+    tests = 2.0 * len(judged)  # of each, and of all together
+    chances = [tests * t_tail(abs(each.pull), test.freedom) for each in judged]
     far = [each for each, own in zip(judged, chances, strict=True) if own < _WRONG]
     far.sort(key=lambda each: -abs(each.pull))
     chance = min(1.0, 2.0 * test.chance, *chances)

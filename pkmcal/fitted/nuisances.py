@@ -11,7 +11,7 @@ from pkmcal.estimation.parameters import Parameters
 from pkmcal.estimation.uncertain_numbers import own_deviations
 
 _MOVED = 2.0  # times its stated deviation, from which such a number is part of the result
-_FAR = 3.0  # times what its statement lets expect, from which a number is bound by it
+_FAR = 4.0  # times what its statement lets expect, from which a number is bound by it
 CHECKED = 0.1  # share of its deviation by which measurements must move it to be judged
 
 

@@ -38,6 +38,8 @@ class PriorTest:
         How likely the largest would be, among so many.
     factor : float
         On the prior's deviations, with which the ratio would be 1.
+    freedom : float
+        Of the noise with which they were compared; inf where it is stated.
     """
 
     ratio: float
@@ -45,6 +47,7 @@ class PriorTest:
     pulls: FloatArray
     pull_chance: float
     factor: float
+    freedom: float = np.inf
 
     @property
     def chance_of_either(self) -> float:
@@ -135,6 +138,7 @@ def prior_test(
         pulls=pulls,
         pull_chance=min(1.0, chances * t_tail(largest, freedom)),
         factor=_fitting(along, singular, variance),
+        freedom=freedom,
     )
 
 
