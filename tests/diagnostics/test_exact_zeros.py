@@ -91,3 +91,21 @@ def test_a_search_with_other_weights_that_leaves_rows_unsolved_is_not_taken() ->
     with pytest.warns(pk.CalibrationWarning, match="another assembly mode"):
         found = pk.identify(robot, m, unknown="frame")
     assert np.isfinite(found.values).all()
+
+
+@pytest.mark.parametrize("name", ["3rrr-planar", "five-bar"])
+def test_a_height_that_is_exactly_zero_is_no_evidence_for_held_out_points(name: str) -> None:
+    """It counted as a third of the equations, and the tests had too many degrees of freedom."""
+    for seed in range(3):
+        robot, m = planar(name, seed, stated=False)
+        without = m.values.copy()
+        without[:, 2] = np.nan
+        with_zeros, alone = (
+            pk.identify(robot, pk.Measurements(m.actuators, values - [5.0, 3.0, 0.0], "position"),
+                        holdout=0.25)
+            for values in (m.values, without)
+        )  # fmt: skip
+        assert with_zeros.holdout_rms == pytest.approx(alone.holdout_rms, rel=1e-4)
+        assert with_zeros.holdout_expected == pytest.approx(alone.holdout_expected, rel=1e-3)
+        assert with_zeros.holdout_test is not None and alone.holdout_test is not None
+        assert with_zeros.holdout_test.chance == pytest.approx(alone.holdout_test.chance, rel=0.02)
