@@ -15,6 +15,7 @@ from pkmcal.arrays import BoolArray, FloatArray
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.misfits import rounding
+from pkmcal.kinematics.calibratable import as_parallel
 from pkmcal.kinematics.robot import Robot
 from pkmcal.screw import from_pose, to_pose
 
@@ -31,8 +32,8 @@ def mirror_fits(equations: Equations, evaluation: Evaluation, noise: FloatArray)
 
     The poses are fitted there. Axes, such as those of swivels, are left as they are.
     """
-    robot, parameters = evaluation.robot, equations.parameters
-    if not isinstance(robot, Robot) or not equations.machines.unknowns:
+    robot, parameters = as_parallel(evaluation.robot), equations.parameters
+    if robot is None or not equations.machines.unknowns:
         return False
     if robot.model.chains is not None or robot.model.map not in _DIMENSIONS:
         return False

@@ -16,6 +16,7 @@ from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.misfits import worst_readings
 from pkmcal.estimation.row_states import RowStates
+from pkmcal.kinematics.calibratable import as_parallel
 from pkmcal.kinematics.robot import Robot
 
 _GROSS = 6.0  # times the median misfit from which a row is tried in other modes
@@ -66,7 +67,7 @@ def _better(equations: Equations, evaluation: Evaluation) -> tuple[IntArray, Flo
     """Distinct rows of actuators (s,) that another mode fits better, and their poses there."""
     machines, pose = evaluation.machines, evaluation.pose
     none = np.empty(0, dtype=np.intp), np.empty((0, 6))
-    if not isinstance(evaluation.robot, Robot):
+    if as_parallel(evaluation.robot) is None:
         return none  # an arm has one pose
     misfit = worst_readings(equations, pose, evaluation.theta)
     solved, read = np.isfinite(misfit), ~np.isnan(misfit)

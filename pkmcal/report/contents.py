@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from pkmcal import display
-from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray, largest_first, propagate, rms
 from pkmcal.calibration.identification import Identification
 from pkmcal.core.library import POSE
@@ -79,9 +78,8 @@ def instrument_identified(found: Identification) -> bool:
 
 def export_command(found: Identification) -> str:
     """Return the command that writes the calibrated machine for its firmware; "" of others."""
-    if isinstance(found.robot, SerialArm) or found.robot.model.controller is None:
-        return ""
-    return found.robot.model.controller.command("robot.toml")
+    controller = found.fit.parameters.robot.model.controller
+    return "" if controller is None else controller.command("robot.toml")
 
 
 def directions(found: Identification) -> list[dict[str, Any]]:
@@ -300,8 +298,8 @@ def over_the_workspace(
 
 def over_the_measured(found: Identification) -> FloatArray:
     """Predict the accuracy at the poses that were measured, mm; those that are known."""
-    end = found.fit.end
-    predicted = expected(found, end.actuators if isinstance(found.robot, SerialArm) else end.pose)
+    end, machine = found.fit.end, found.fit.parameters.robot
+    predicted = expected(found, machine.as_commands(end.pose, end.actuators))
     return predicted[np.isfinite(predicted)]
 
 
