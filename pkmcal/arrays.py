@@ -25,7 +25,10 @@ Unit = Literal[
 ]  # fmt: skip
 
 _LONG = 8  # rows in a row that have a matrix in common, on the average, to be one product
-_ALIKE = 1e-6  # share by which entries of a direction differ that are not equal
+# By less, or a smaller share, numbers are equal of which the largest is chosen: rounding that
+# another processor or order of sums makes is up to some 1e-7 where they are differences, and no
+# choice may hang on it. The first of equal ones is taken.
+TIED = 1e-6
 
 
 def as_numbers(name: str, array: ArrayLike, last: str | int) -> NDArray[Any]:
@@ -138,7 +141,7 @@ def furthest_axis(direction: FloatArray) -> int:
     (0, 0)
     """
     along = np.abs(direction)
-    return first_largest(-along, _ALIKE * float(along.max()))
+    return first_largest(-along, TIED * float(along.max()))
 
 
 def lots(count: int, most: int = 16384) -> Iterator[slice]:

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _STRONG = 0.95  # correlation worth a word
-_ALIKE = 9  # decimals to which correlations differ that are not equal
+_TIED_DECIMALS = 9  # decimals to which correlations differ that are not equal
 _UNIDENTIFIABLE = 1e-3  # mm a pose moves per mm along an unidentifiable combination
 
 
@@ -131,7 +131,7 @@ class Identification(Solution[Machine], Result):
             (self.free[i], self.free[j], float(matrix[i, j]))
             for i, j in zip(first, second, strict=True)
         ]
-        return tuple(sorted(pairs, key=lambda pair: -round(abs(pair[2]), _ALIKE)))
+        return tuple(sorted(pairs, key=lambda pair: -round(abs(pair[2]), _TIED_DECIMALS)))
 
     def _columns(self) -> dict[str, Any]:
         """The parameters: value, deviation and change of each."""

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray
+from pkmcal.arrays import TIED, BoolArray, FloatArray
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.misfits import rounding
@@ -20,7 +20,6 @@ from pkmcal.kinematics.robot import Robot
 from pkmcal.screw import from_pose, to_pose
 
 MIRROR = "its mirror image fits as well: which of the two it is, the robot file says alone"
-_ALIKE = 1e-6  # share by which costs differ that are the same
 _FAR = 1e4  # times the cost, at mirrored poses: no image, which would have the same there
 _FLAT = 1e-9  # of the machine's size: points in one plane
 _DIMENSIONS = {"translation": 3, "xy": 2, "spatial": 3, "planar": 2}
@@ -59,7 +58,7 @@ def mirror_fits(equations: Equations, evaluation: Evaluation, noise: FloatArray)
         ):
             continue
         there = image.at(theta, noise, states)
-        if there.ok and _cost(image, there, noise) <= (1.0 + _ALIKE) * cost:
+        if there.ok and _cost(image, there, noise) <= (1.0 + TIED) * cost:
             return True
     return False
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from pkmcal.arguments import instance
-from pkmcal.arrays import BoolArray, FloatArray, IntArray, largest_first
+from pkmcal.arrays import TIED, BoolArray, FloatArray, IntArray, largest_first
 from pkmcal.display import first_rows
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.evaluation import Evaluation
@@ -24,7 +24,6 @@ _LEAST = 1e-3  # mm; misfits of measurements without noise
 _HALF = 0.5  # of the misfit that another mode may leave
 _FITTING = 4.0  # times what is gross, beyond which no mode fits
 _NEIGHBOURS = 6  # rows from whose poses a machine is solved whose modes are not known
-_ALIKE = 1e-6  # share of the spread by which rows differ that are not equally far
 _MOST = 0.5  # share of the poses that may miss grossly: of more, something else is wrong
 
 
@@ -110,6 +109,6 @@ def _modes(
     there = np.flatnonzero(sound)
     spread = np.maximum(np.ptp(actuators, axis=0), np.finfo(float).tiny)
     apart = np.linalg.norm((actuators[there] - actuators[k]) / spread, axis=1)
-    near = there[largest_first(-apart, _ALIKE)[:_NEIGHBOURS]]
+    near = there[largest_first(-apart, TIED)[:_NEIGHBOURS]]
     solved = robot.forward(np.tile(actuators[k], (len(near), 1)), pose[near])
     return np.vstack([found.poses, solved.pose[solved.ok]])

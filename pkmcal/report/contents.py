@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from pkmcal import display
-from pkmcal.arrays import FloatArray, largest_first, propagate, rms
+from pkmcal.arrays import TIED, FloatArray, largest_first, propagate, rms
 from pkmcal.calibration.identification import Identification
 from pkmcal.core.library import POSE
 from pkmcal.display import printable
@@ -21,7 +21,6 @@ from pkmcal.measurements.repeats import groups
 from pkmcal.report.places import Places
 
 _WORST = 10  # rows that are listed
-_ALIKE = 1e-6  # mm by which distances differ that are not equal
 _MOSTLY, _ONLY = 0.5, 0.99  # of the prior's deviation, above which the prior dominates
 _ELSEWHERE = 1.0  # mm: a pose so far from the desired one is of another assembly mode
 _NEGLIGIBLE = 1e-3  # share of a parameter in unidentifiable combinations
@@ -131,7 +130,7 @@ def worst(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Select the rows with the largest distances after the calibration."""
     read = [row for row in rows if np.isfinite(row["after"])]
     off = np.array([row["after"] for row in read])
-    return [read[i] for i in largest_first(off, _ALIKE)[:_WORST]]
+    return [read[i] for i in largest_first(off, TIED)[:_WORST]]
 
 
 def moved(rows: list[dict[str, Any]]) -> list[tuple[int, str, str, int]]:
