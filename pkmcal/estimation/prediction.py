@@ -241,7 +241,7 @@ class Prediction:
         numbers, by = self.arguments_of(i, theta), dict(predicted.by)
         change = np.zeros(predicted.values.shape)
         for effect in effects:
-            for machine, rows in self._machines(i, theta):
+            for machine, rows in self.machines_of(i, theta):
                 for place, by_twist in places:
                     at = place[rows]
                     found = effect.moved(machine, pose[at], table.actuators[at], rows, numbers)
@@ -267,11 +267,11 @@ class Prediction:
             pose[self.table.pose_of[i]],
             None if other is None else pose[other],
             axis=self.datasets[i].axis,
-            machines=lambda: self._machines(i, theta),
+            machines=lambda: self.machines_of(i, theta),
             measured=measured,
         )
 
-    def _machines(self, i: int, theta: FloatArray) -> Iterator[tuple[Calibratable, IntArray]]:
+    def machines_of(self, i: int, theta: FloatArray) -> Iterator[tuple[Calibratable, IntArray]]:
         """The machines of set `i`, one or one a session, and the rows of each."""
         table, p = self.table, self.parameters
         machine_of_row = table.machine_of_pose[table.pose_of[i]]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -82,6 +83,8 @@ def require_shape(what: str, found: object, shape: tuple[int, ...]) -> None:
     if not isinstance(found, np.ndarray) or found.shape != shape:
         seen = found.shape if isinstance(found, np.ndarray) else kind(found)
         raise ArgumentError(f"{what} must be an array of shape {shape}; found {seen}")
+    if found.dtype.kind == "f" and found.dtype.itemsize < 8:
+        raise ArgumentError(f"{what} must be doubles; found {found.dtype}")
 
 
 def require_predicted(name: str, components: int, rows: int, found: object) -> None:
@@ -94,6 +97,33 @@ def require_predicted(name: str, components: int, rows: int, found: object) -> N
     for side in ("by_frame", "by_other"):
         if getattr(found, side) is not None:
             require_shape(f"{what}: {side}", getattr(found, side), (rows, components, 6))
+
+
+def require_arguments(name: str, predict: Callable[..., Any], given: object, method: str) -> None:
+    """Refuse arguments that `predict` of a kind does not take by name and would swallow.
+
+    Raises
+    ------
+    ValueError
+        A name that is not among its parameters, where it lists any.
+    TypeError
+        No mapping of names.
+    """
+    what = f"kind: {method} of {name!r}"
+    if not isinstance(given, Mapping):
+        raise ArgumentTypeError(
+            f"{what} must return arguments of predict by name; found {kind(given)}"
+        )
+    taken = [
+        each.name
+        for each in inspect.signature(predict).parameters.values()
+        if each.kind is not inspect.Parameter.VAR_KEYWORD
+    ][1:]  # the first is where the machine is
+    for each in given:
+        if taken and each not in taken:
+            raise ArgumentError(
+                f"{what}: predict takes no argument {each!r}; it takes {', '.join(taken)}"
+            )
 
 
 class Lots(NamedTuple):

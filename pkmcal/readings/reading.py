@@ -23,7 +23,14 @@ from pkmcal.files.csv_writer import WrittenColumn
 from pkmcal.readings import orientation, rows
 from pkmcal.readings.alignment import Laid, Sighting
 from pkmcal.readings.measured import InFit, Measured
-from pkmcal.readings.predicted import At, Lots, Predicted, Shared, require_predicted
+from pkmcal.readings.predicted import (
+    At,
+    Lots,
+    Predicted,
+    Shared,
+    require_arguments,
+    require_predicted,
+)
 from pkmcal.readings.unknowns import Dependence, Found
 
 Components = tuple[tuple[str, str], ...]
@@ -231,8 +238,9 @@ class Reading:
 
     def simulated(self, m: Measured, solve: Solve) -> FloatArray:
         """Compute what the instrument would read without noise, (N, k)."""
-        at = At(solve(m.actuators, "q").pose, axis=np.full(len(m), 2))
-        found = self.predict(at, **self.arguments(m))
+        at, given = At(solve(m.actuators, "q").pose, axis=np.full(len(m), 2)), self.arguments(m)
+        require_arguments(self.name, self.predict, given, "arguments")
+        found = self.predict(at, **given)
         require_predicted(self.name, len(self.components), len(m), found)
         return found.values
 
