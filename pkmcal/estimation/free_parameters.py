@@ -225,6 +225,11 @@ def _beside_geometry(datasets: Sequence[FitData]) -> dict[tuple[str, str], Numbe
                     f" alike: {', '.join(known.names)} [{', '.join(known.units)}] and"
                     f" {', '.join(own.names)} [{', '.join(own.units)}]; give each a role of its own"
                 )
+            if not np.isfinite(own.start).all():
+                raise ArgumentError(
+                    f"{role}: the search for {', '.join(own.names)} has a start that is no finite"
+                    " number"
+                )
             if not np.array_equal(known.start, own.start):
                 raise ArgumentError(
                     f"{role}: {role} {name} starts at different places in different"

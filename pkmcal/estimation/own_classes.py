@@ -85,8 +85,8 @@ def _compare_reading(
         _compare(stated, values, step, reading.difference, (what, names, by), rows)
 
     for at, numbers, rows in prediction.in_frames(i, evaluation.pose, evaluation.theta):
-        named = numbers.keys() - {"tool_origin"}  # which goes with a tool by itself
-        require_arguments(reading.name, reading.predict, dict.fromkeys(named), "dependences")
+        named = {name: own for name, own in numbers.items() if name != "tool_origin"}
+        require_arguments(reading.name, reading.predict, at, named, "dependences")
         seen = reading.predict(at, **numbers)
         for k, step in enumerate(of_twist):
             by = f"by_twist, by {_TWIST[k]}"

@@ -99,31 +99,34 @@ def require_predicted(name: str, components: int, rows: int, found: object) -> N
             require_shape(f"{what}: {side}", getattr(found, side), (rows, components, 6))
 
 
-def require_arguments(name: str, predict: Callable[..., Any], given: object, method: str) -> None:
-    """Refuse arguments that `predict` of a kind does not take by name and would swallow.
+def require_arguments(
+    name: str,
+    predict: Callable[..., Any],
+    at: At,
+    given: Mapping[str, Any],
+    method: str,
+) -> None:
+    """Refuse an argument that `predict` of a kind swallows: a mistyped name.
+
+    That is one which it neither lists nor hands on to what its values depend on.
 
     Raises
     ------
     ValueError
-        A name that is not among its parameters, where it lists any.
+        Such a name.
     TypeError
         No mapping of names.
     """
     what = f"kind: {method} of {name!r}"
     if not isinstance(given, Mapping):
-        raise ArgumentTypeError(
-            f"{what} must return arguments of predict by name; found {kind(given)}"
-        )
-    taken = [
-        each.name
-        for each in inspect.signature(predict).parameters.values()
-        if each.kind is not inspect.Parameter.VAR_KEYWORD
-    ][1:]  # the first is where the machine is
-    for each in given:
-        if taken and each not in taken:
-            raise ArgumentError(
-                f"{what}: predict takes no argument {each!r}; it takes {', '.join(taken)}"
-            )
+        found = kind(given)
+        raise ArgumentTypeError(f"{what} must return arguments of predict by name; found {found}")
+    listed = inspect.signature(predict).parameters
+    for each in given.keys() - listed.keys():
+        other = {**given, each: np.asarray(given[each]) + 1.0}
+        values = [predict(at, **numbers).values for numbers in (given, other)]
+        if np.array_equal(*values, equal_nan=True):
+            raise ArgumentError(f"{what}: {each!r} is no argument of predict, which ignores it")
 
 
 class Lots(NamedTuple):

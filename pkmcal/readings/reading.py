@@ -239,7 +239,7 @@ class Reading:
     def simulated(self, m: Measured, solve: Solve) -> FloatArray:
         """Compute what the instrument would read without noise, (N, k)."""
         at, given = At(solve(m.actuators, "q").pose, axis=np.full(len(m), 2)), self.arguments(m)
-        require_arguments(self.name, self.predict, given, "arguments")
+        require_arguments(self.name, self.predict, at, given, "arguments")
         found = self.predict(at, **given)
         require_predicted(self.name, len(self.components), len(m), found)
         return found.values

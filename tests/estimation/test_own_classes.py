@@ -93,7 +93,7 @@ def test_an_argument_that_predict_does_not_take_is_named(loops: pk.Measurements)
         def arguments(self, m: Any) -> dict[str, Any]:
             return {"Target": m.targets}
 
-    with pytest.raises(pk.ArgumentError, match=r"predict takes no argument 'Target'; it takes tar"):
+    with pytest.raises(pk.ArgumentError, match="'Target' is no argument of predict, which ignor"):
         pk.VirtualMachine(ROBOT).measure(Q, Typed(NAMES), [30.0, 0, 50])
 
     class Depends(Loop):
@@ -101,7 +101,7 @@ def test_an_argument_that_predict_does_not_take_is_named(loops: pk.Measurements)
             for each in super().dependences(data):
                 yield replace(each, argument="Target") if each.argument == "target" else each
 
-    with pytest.raises(pk.ArgumentError, match=r"dependences of 'loop': predict takes no .*Target"):
+    with pytest.raises(pk.ArgumentError, match="dependences of 'loop': 'Target' is no argument"):
         identified(Depends(NAMES), loops)
 
 
