@@ -56,11 +56,12 @@ def parameters(
     """
     geometry = robot.geometry
     free, along = _free_names(robot, asked)
-    places = np.array([geometry.names.index(name) for name in (*free, *along)], dtype=np.intp)
+    known = geometry.names
+    places = np.array([known.index(name) for name in (*free, *along)], dtype=np.intp)
     beside = _beside_geometry(datasets) | _of_residuals(asked.residuals, geometry.names)
     ends = np.cumsum([len(places), *(len(each.names) for each in beside.values())]).tolist()
     blocks = dict(zip(beside, map(slice, ends, ends[1:]), strict=False))
-    numbers = [geometry.names[i] for i in places]
+    numbers = [known[i] for i in places.tolist()]
     numbers += [name for each in beside.values() for name in each.names]
     scope = scopes(numbers, blocks, asked.per_session, asked.by_set)
     entries = _entries(len(places), scope, blocks, datasets, asked.held_points)

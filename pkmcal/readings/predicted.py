@@ -124,8 +124,8 @@ def require_arguments(
     listed = inspect.signature(predict).parameters
     for each in given.keys() - listed.keys():
         other = {**given, each: np.asarray(given[each]) + 1.0}
-        values = [predict(at, **numbers).values for numbers in (given, other)]
-        if np.array_equal(*values, equal_nan=True):
+        one, two = (predict(at, **numbers) for numbers in (given, other))
+        if isinstance(one, Predicted) and np.array_equal(one.values, two.values, equal_nan=True):
             raise ArgumentError(f"{what}: {each!r} is no argument of predict, which ignores it")
 
 

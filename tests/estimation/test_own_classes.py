@@ -13,7 +13,7 @@ import pytest
 import pkmcal as pk
 from pkmcal.arrays import FloatArray
 from pkmcal.effects.effect import Moved
-from pkmcal.readings import At, Predicted, Reading
+from pkmcal.readings import At, Predicted, Reading, Start, always
 from pkmcal.readings.unknowns import Dependence
 
 from ..effects.test_own_effect import RATE, Sinking, points
@@ -229,3 +229,25 @@ def test_numbers_of_less_than_double_precision_are_refused(loops: pk.Measurement
 
     with pytest.raises(pk.ArgumentError, match="values must be doubles; found float32"):
         identified(Coarse(NAMES), loops)
+
+
+def test_a_number_of_a_reading_that_nothing_follows_is_named_by_the_verdict(
+    loops: pk.Measurements,
+) -> None:
+    class Worn(Loop):
+        def predict(self, at: At, wear: Any = 0.0, **numbers: Any) -> Predicted:  # type: ignore[override]
+            seen = super().predict(at, **numbers)
+            return replace(seen, by={**seen.by, "wear": np.zeros((len(seen.values), 1, 1))})
+
+        def dependences(self, data: Any) -> Iterator[Dependence]:
+            yield from super().dependences(data)
+            start = {("wear", ""): Start((0,), np.zeros(1))}
+            yield always("wear", "wear", (("depth", "mm"),), [""] * len(data.measured), start)
+
+    sound = identified(Loop(NAMES), loops)
+    found = identified(Worn(NAMES), loops)
+    remark = "wear.depth is not determined by what was read; the machine's numbers do not depend"
+    assert [each for each in found.verdict.remarks if each.startswith(remark)]
+    assert found.verdict.state == sound.verdict.state == "calibrated"
+    assert "undetermined-reading" not in [each.check for each in sound.verdict.said]
+    np.testing.assert_allclose(found.values[:6], sound.values[:6], atol=1e-9)
