@@ -166,10 +166,11 @@ class Prediction:
     def of_set(self, i: int, pose: FloatArray, theta: FloatArray) -> Predicted:
         """Predict the readings of a set at poses (K, 6), with their derivatives."""
         m = self.table.sets[i]
-        if not m.components:
+        components = len(m.instrument.components)
+        if not components:
             return Predicted(np.empty((len(m), 0)), np.empty((len(m), 0, 6)))
         alone = self._by_geometry_alone(i, pose, theta)
-        require_predicted(m.kind, len(m.components), len(m), alone)
+        require_predicted(m.kind, components, len(m), alone)
         moved = self._moved(i, alone, pose, theta)
         require_derivatives(m.instrument, moved, self.numbers[i])
         return moved
@@ -293,7 +294,13 @@ class Prediction:
 
         A batch is rows through all sets, and for each set that has some of these its rows and their
         derivative (b, k, n). There is one batch where poses have unknowns.
+
+        Where there are few rows the evaluation has them for the next who asks.
         """
+        owner, known = evaluation.cache.pop("derivatives", (None, []))
+        if owner is self:
+            yield slice(0, len(self.table.rows)), known
+            return
         table, count, size = self.table, len(self.table.rows), len(self.parameters)
         predicted, machines = self.predicted(evaluation), evaluation.machines
         direct = [self.by_geometry(i, evaluation) for i in range(len(table.sets))]
@@ -319,6 +326,9 @@ class Prediction:
                 wide = by_parameters(part, table.columns, table.part_of[i][rows], size)
                 read, residual = table.sets[i].instrument, misfits[i][rows]
                 found.append((i, rows, read.by_difference(wide, residual)))
+            if count <= _BATCH:
+                again = [(i, rows, part.copy()) for i, rows, part in found]
+                evaluation.cache["derivatives"] = self, again
             yield batch, found
 
     def by_geometry(self, i: int, evaluation: Evaluation) -> FloatArray | None:

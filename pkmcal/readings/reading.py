@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
 from typing import Any, ClassVar, Literal, NamedTuple, Protocol, TypeVar
 
 import numpy as np
@@ -67,6 +68,15 @@ class Family(NamedTuple):
     def noun(self) -> str:
         """Noun for these readings."""
         return {"mm": "lengths", "rad": "angles"}.get(self.unit, f"readings in {self.unit}")
+
+
+@cache
+def families_by_unit(units: tuple[str, ...]) -> tuple[Family, ...]:
+    """Families of components that have the same of these units."""
+    return tuple(
+        Family(unit, tuple(k for k, each in enumerate(units) if each == unit))
+        for unit in dict.fromkeys(units)
+    )
 
 
 class Reading:
@@ -298,10 +308,7 @@ class Reading:
     @property
     def families(self) -> tuple[Family, ...]:
         """Return the components by unit: lengths or angles, say, may be wrong by themselves."""
-        return tuple(
-            Family(unit, tuple(k for k, each in enumerate(self.units) if each == unit))
-            for unit in dict.fromkeys(self.units)
-        )
+        return families_by_unit(self.units)
 
     def arcs(self, m: Measured, length: float) -> FloatArray:
         """Return factors from each component's residual to mm (k,): one number for all rows."""

@@ -62,6 +62,24 @@ def step_of(values: FloatArray, unit: str, least: float = 0.0) -> float:
     return 0.0
 
 
+def smallest_gaps(values: FloatArray) -> FloatArray:
+    """The smallest difference of two readings (N, k) of each component that is no rounding, (k,).
+
+    A step is no larger, but for rounding; inf where nothing was read in some row.
+
+    Examples
+    --------
+    >>> smallest_gaps(np.array([[0.3, 1.0], [0.1, 1.0], [0.4, 1.5], [0.9, 1.0]])).round(9)
+    array([0.1, 0.5])
+    """
+    ordered = np.sort(values, axis=0)
+    gaps = ordered[1:] - ordered[:-1]
+    largest = np.maximum(np.abs(ordered[0]), np.abs(ordered[-1]))
+    rounding = 2.0 * np.maximum(_EXACT * (ordered[-1] - ordered[0]), _ROUNDING * largest)
+    found: FloatArray = np.where(gaps > rounding, gaps, np.inf).min(axis=0, initial=np.inf)
+    return found
+
+
 def _candidates(differences: FloatArray, unit: str, least: float) -> FloatArray:
     """Steps that may be, the largest first."""
     gaps = differences[1:] - differences[:-1]
