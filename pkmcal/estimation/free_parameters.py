@@ -76,7 +76,8 @@ def parameters(
     of_uncertain = spread(
         asked.uncertainty, [n for n, own in zip(names, uncertain, strict=True) if own]
     )
-    every = [geometry.units[i] for i in places]
+    units_of = geometry.units
+    every = [units_of[i] for i in places.tolist()]
     every += [unit for each in beside.values() for unit in each.units]
     if not names:
         raise ArgumentError("free: name at least one parameter, nothing else is unknown")
@@ -337,7 +338,8 @@ def _prior(
     """Return the prior of each parameter: as effects state it, unless `prior` names it."""
     prior = asked.prior
     sigma = np.full(len(names), np.inf)
-    of_effects = [asked.of_effects.get(name.partition("@")[0], np.inf) for name in names]
+    own = asked.of_effects
+    of_effects = [own.get(name.partition("@")[0], np.inf) if own else np.inf for name in names]
     if isinstance(prior, Mapping):
         sigma[:] = of_effects
     if isinstance(prior, Mapping):

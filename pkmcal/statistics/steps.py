@@ -8,6 +8,8 @@ them is less.
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray
@@ -86,11 +88,16 @@ def _candidates(differences: FloatArray, unit: str, least: float) -> FloatArray:
     smallest = float(gaps[gaps > _EXACT * differences[-1]].min(initial=differences[0]))
     if smallest * (1.0 + _EXACT) < least:
         return np.empty(0)
-    decimal = np.concatenate([_DECIMALS * size for size in _UNITS.get(unit, (1.0,))])
-    steps = np.concatenate([decimal, smallest / np.arange(1, _PARTS + 1)])
+    steps = np.concatenate([_decimals(unit), smallest / np.arange(1, _PARTS + 1)])
     possible = (steps >= least) & (steps <= smallest * (1.0 + _EXACT))
     found: FloatArray = np.sort(steps[possible])[::-1]
     return found
+
+
+@cache
+def _decimals(unit: str) -> FloatArray:
+    """Steps that dials, displays and files of a unit have."""
+    return np.concatenate([_DECIMALS * size for size in _UNITS.get(unit, (1.0,))])
 
 
 def _multiples(
