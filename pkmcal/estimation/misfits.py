@@ -98,15 +98,21 @@ def _closures_off(system: PoseSystem, evaluation: Evaluation) -> FloatArray:
 def rounding(equations: Equations, noise: FloatArray) -> float:
     """Length of the whitened rounding errors of what is predicted, for noise (G,)."""
     equations = equations.whole or equations
-    length, readings, sigma = equations.parameters.robot.length, 0.0, equations.machines.sigma
+    readings, sigma = 0.0, equations.machines.sigma
     if equations.system is None or equations.whitening.any_read:
-        parts = [rounding_of(m, length) for m in equations.table.sets]
-        readings = float(np.linalg.norm(equations.whitening.whitened(parts, noise)))
+        readings = float(np.linalg.norm(rounding_of_readings(equations, noise)))
     if equations.system is None or sigma is None:
         return readings
     size = _ROUNDING * float(np.abs(equations.table.actuators).max())
     whitened = size / (noise[equations.system.blocks.groups] * sigma)
     return float(np.hypot(readings, np.linalg.norm(whitened)))
+
+
+def rounding_of_readings(equations: Equations, noise: FloatArray) -> FloatArray:
+    """Whitened rounding errors (M,) of what is predicted of readings, for noise (G,)."""
+    length = equations.parameters.robot.length
+    parts = [rounding_of(m, length) for m in equations.table.sets]
+    return equations.whitening.whitened(parts, noise)
 
 
 def rounding_of(measured: Measurements, length: float) -> FloatArray:
