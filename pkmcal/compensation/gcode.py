@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 from pkmcal.arrays import FloatArray
 from pkmcal.compensation.gcode_dialect import AXES, NEVER_PASSED, Dialect, Meaning
-from pkmcal.compensation.gcode_line import Command, Unclear, Word, commands
+from pkmcal.compensation.gcode_line import Command, Unclear, Word, bare, commands
 from pkmcal.compensation.gcode_move import NO_FEED, Extrusion, Feed, Move
 from pkmcal.compensation.gcode_tools import Carried, Tools
 from pkmcal.exceptions import ArgumentError, FileError
@@ -157,7 +157,12 @@ class Program:
             code = line.rstrip("\r\n")
             if code.startswith(MARK) and i == 0:
                 code = code[1:]
-                self._require_remark(i, code)
+                if bare(code, self.dialect).strip():
+                    raise self.wrong(
+                        i,
+                        "a byte-order mark stands before it, and it may not be read: save it"
+                        " without",
+                    )
             marked = code.strip() == "%" if marked is None and code.strip() else marked
             if code.strip() == "%" and self.dialect.block:
                 marks += bool(marked)
@@ -173,17 +178,6 @@ class Program:
         if state.timed and not end:
             yield ending, None
         yield from self._end_of_times(state, ending)
-
-    def _require_remark(self, i: int, code: str) -> None:
-        """Refuse a command behind a byte-order mark, which no controller knows."""
-        try:
-            acts = bool(commands(code, self.dialect)) or code.strip() == "%"
-        except Unclear:
-            acts = True
-        if acts:
-            raise self.wrong(
-                i, "a byte-order mark stands before it, and it may not be read: save it without"
-            )
 
     @staticmethod
     def _end_of_times(state: _State, line: str) -> Iterator[tuple[str, None]]:

@@ -19,7 +19,7 @@ def without_mark(text: str) -> str:
     """A text without the byte-order mark that stands before a remark; before words it is odd."""
     if text[:1] != "\ufeff":
         return text
-    if text[1:].lstrip(" ")[:1] not in (";", "\r", "\n", "("):
+    if text[1:].lstrip(" ")[:1] not in (";", "\r", "\n", "(", ""):
         raise Odd("words behind a byte-order mark")
     return text[1:]
 
