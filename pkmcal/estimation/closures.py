@@ -110,7 +110,7 @@ class ExactActuators:
         self, robot: Calibratable, states: RowStates, places: IntArray
     ) -> FloatArray | None:
         """Twists, actuators held."""
-        return robot.error_twists(states.pose, states.actuators)[:, :, places]
+        return robot.error_twists(states.pose, states.actuators).take(places, axis=2)
 
 
 class NoisyActuators:

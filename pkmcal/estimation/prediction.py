@@ -373,13 +373,16 @@ class Prediction:
             first = last
 
     def _poses_of(self, some: Sequence[tuple[int, slice]]) -> IntArray:
-        """Distinct poses of rows of sets, in order."""
+        """Distinct poses of rows of sets: in the order of the rows, unless some have one."""
         table = self.table
         if sum(rows.stop - rows.start for _, rows in some) == len(table.rows):
             return np.arange(len(table.actuators))
         pairs = [((table.pose_of[i], table.other_of[i]), rows) for i, rows in some]
         ends = [end[rows] for both, rows in pairs for end in both if end is not None]
-        return np.unique(np.concatenate(ends))
+        whole = np.concatenate(ends)
+        count, last = np.arange(len(whole)), np.empty(len(table.actuators), dtype=np.intp)
+        last[whole] = count
+        return whole if np.array_equal(last[whole], count) else np.unique(whole)
 
 
 def _columns(of_rows: IntArray, numbers: IntArray) -> IntArray:

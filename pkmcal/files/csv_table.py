@@ -30,7 +30,7 @@ from pkmcal.exceptions import FileError
 from pkmcal.files import reading, units
 from pkmcal.files.column_names import BESIDE, is_known
 from pkmcal.files.header import Header, find_header, parted
-from pkmcal.files.number_text import Signs, decimals, plain, thousands, undecided
+from pkmcal.files.number_text import Signs, decimals, numbers_alone, plain, thousands, undecided
 from pkmcal.files.reading import LONGEST_NAME, MOST_CELLS, MOST_COLUMNS
 from pkmcal.files.text_rows import is_number, text_rows
 from pkmcal.files.understood import Understood
@@ -148,23 +148,25 @@ class Table:
         self.lines = [line for line, _ in rows]
         self._decimals = decimals(cells for _, cells in rows) if self._comma else {}
         self.columns: dict[str, Column] = {}
-        for i, heading in enumerate(names):
-            self._add(i, heading, tuple(cells[i] for _, cells in rows))
+        columns = zip(*(cells for _, cells in rows), strict=True)
+        for i, (heading, cells) in enumerate(zip(names, columns, strict=True)):
+            self._add(i, heading, cells)
 
     def _rows_below(
         self, header: Header, packed: bool, separator: str
     ) -> list[tuple[int, list[str]]]:
         """The rows of the table with their lines, each as wide as the header."""
         names = header.headings
-        rows = [(line, cells) for line, cells in header.rows if any(cells)]
-        again = [line for line, cells in rows if _fitted(cells, names, packed) == names]
+        rows = [
+            (line, _fitted(cells, names, packed)) for line, cells in header.rows if any(cells)
+        ]
+        again = {line: None for line, cells in rows if cells == names}
         if again and header.line:
-            self.notes.append(f"column names once more in line {again[0]}, left out")
+            self.notes.append(f"column names once more in line {next(iter(again))}, left out")
             rows = [(line, cells) for line, cells in rows if line not in again]
         if not rows:
             raise FileError(f"{self.path}: no rows below the column names of line {header.line}")
         width = len(names)
-        rows = [(line, _fitted(cells, names, packed)) for line, cells in rows]
         while len(rows) > 1 and len(rows[-1][1]) < width and not any(map(is_number, rows[-1][1])):
             line, below = rows.pop()
             self.notes.append(
@@ -355,14 +357,7 @@ class Table:
         elif column.unit:
             self._units_taken[name] = column.unit, "heading"
         quantity, (times, over) = self._conversion(name, column, quantities, expected)
-        values = np.empty(len(self))
-        signs = self._signs(name, column)
-        for row, cell in enumerate(column.cells):
-            if unseen and cell.lower() in _UNSEEN:
-                values[row] = math.nan
-                self.note(f"cells with {printable(cell)!r} taken as not measured")
-                continue
-            values[row] = math.nan if blank and not cell else self._number(name, row, cell, signs)
+        values = self._values(name, column, blank, unseen)
         with np.errstate(over="ignore"):
             converted = values * times / over
         if (row := int(np.argmax(np.isinf(converted)))) or np.isinf(converted[0]):
@@ -371,6 +366,23 @@ class Table:
                 name, row, f"expected a smaller number, found {printable(cell)!r}"
             )
         return converted, quantity
+
+    def _values(self, name: str, column: Column, blank: bool, unseen: bool) -> FloatArray:
+        """The numbers of a column as they stand."""
+        alone = numbers_alone(column.cells)  # as programs write them, which may be very many
+        if alone is not None and np.isfinite(alone).all():
+            if column.decimal_comma:
+                self._decide(name, column)
+            return np.array(alone)
+        values = np.empty(len(self))
+        signs = self._signs(name, column)
+        for row, cell in enumerate(column.cells):
+            if unseen and cell.lower() in _UNSEEN:
+                values[row] = math.nan
+                self.note(f"cells with {printable(cell)!r} taken as not measured")
+                continue
+            values[row] = math.nan if blank and not cell else self._number(name, row, cell, signs)
+        return values
 
     def stacked(self, names: Sequence[str], units: Sequence[str]) -> FloatArray:
         """Columns of numbers side by side (rows, k), each in its unit; all have to be there."""
