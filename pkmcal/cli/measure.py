@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
@@ -10,7 +12,7 @@ import typer
 
 from pkmcal.cli.options import Free, Prior, RobotOrArm, Seed
 from pkmcal.cli.output import say, tell
-from pkmcal.exceptions import ArgumentError
+from pkmcal.exceptions import ArgumentError, Error
 from pkmcal.jobs import measuring
 from pkmcal.jobs.inputs import Inputs
 from pkmcal.jobs.measuring import Driven
@@ -18,7 +20,6 @@ from pkmcal.jobs.plan import Planning
 from pkmcal.jobs.stated import command, quoted
 from pkmcal.live import registry
 from pkmcal.live.course import Course
-from pkmcal.live.device import DeviceError
 from pkmcal.live.measuring_run import Rules
 
 START = "start"
@@ -181,11 +182,12 @@ def measure(
             f"--machine: what is driven; it has {registry.words(registry.MACHINES)}; or --replay"
         )
     rules = Rules(feed, dwell, repeats, safe_height)
-    measurement = measuring.driven(job, machine, instrument, rules, str(out), inputs, tell)
-    try:
-        return _measured(measurement, job, out)
-    finally:
-        measurement.close()
+    with _told_of_lost_connections():
+        measurement = measuring.driven(job, machine, instrument, rules, str(out), inputs, tell)
+        try:
+            return _measured(measurement, job, out)
+        finally:
+            measurement.close()
 
 
 def _measured(measurement: Driven, job: Planning, out: Path) -> int:
@@ -198,7 +200,7 @@ def _measured(measurement: Driven, job: Planning, out: Path) -> int:
     last: list[Course] = [course]
     try:
         _told(measurement.start(), last)
-    except (DeviceError, OSError, KeyboardInterrupt) as error:
+    except (Error, OSError, KeyboardInterrupt) as error:
         rows = measurement.log.rows
         many = "no row" if rows is None else f"{len(rows)} rows"
         tell(f"stopped with {many} in {out}: the same command goes on")
@@ -209,6 +211,18 @@ def _measured(measurement: Driven, job: Planning, out: Path) -> int:
     code = _ended(last[-1], job)
     say(quoted(command("calibrate", [job.robot, str(out)], [])))
     return code
+
+
+@contextmanager
+def _told_of_lost_connections() -> Iterator[None]:
+    """A connection that is gone is an error that is told, not the end of this process."""
+    number = getattr(signal, "SIGPIPE", None)  # which ends a program whose output nobody reads
+    before = None if number is None else signal.signal(number, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        if number is not None:
+            signal.signal(number, before)
 
 
 def _started() -> bool:
@@ -233,6 +247,8 @@ def _told(courses: Iterator[Course], last: list[Course] | None = None) -> Course
         say(f"{_many(found.poses, 'pose')}, {_many(rows, 'row')}: {_predicted(found)}")
         if found.odd is not None:
             tell(f"warning: the newest rows contradict the others: {found.odd}")
+        if found.trouble:
+            tell(f"warning: no calibration of the rows so far: {found.trouble}")
     return found
 
 

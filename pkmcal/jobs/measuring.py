@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ import numpy as np
 from pkmcal.arguments import number, whole
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray
-from pkmcal.exceptions import ArgumentError
+from pkmcal.exceptions import ArgumentError, Error
 from pkmcal.files import provenance
 from pkmcal.jobs import planning
 from pkmcal.jobs.inputs import Inputs
@@ -90,10 +91,8 @@ class Driven:
         self._run.stop()
 
     def close(self) -> None:
-        """Free what was opened."""
-        self.log.close()
-        for each in self._devices:
-            each.close()
+        """Free what was opened; who does not answer any more has said so before."""
+        _close([self.log, *self._devices])
 
 
 def driven(
@@ -169,13 +168,18 @@ def driven(
         if instrument is not None:
             opened.append(registry.instrument(instrument, kind.units))
     except BaseException:
-        for each in opened:
-            each.close()
+        _close(opened)
         raise
     devices = opened[1:]
     run = MeasuringRun(robot, devices[0], devices[1] if instrument else None, log, rules, tell)
     words = _words(machine, instrument, rules, candidates[choice.indices], robot, out)
     return Driven(course, log, words, run, tuple(devices))
+
+
+def _close(opened: list[Any]) -> None:
+    for each in opened:
+        with suppress(Error, OSError):
+            each.close()
 
 
 def _noise_of(job: Planning) -> tuple[bool, Planning]:
@@ -218,6 +222,8 @@ def _checked(job: Planning, rules: Rules, kind: Reading, instrument: str | None)
     number("--feed", rules.feed, above=0)
     number("--dwell", rules.dwell, least=0)
     whole("--repeats", rules.repeats, 1, 1000)
+    if rules.safe_height is not None:
+        number("--safe-height", rules.safe_height)
     if job.accuracy is None and job.count is None:
         raise ArgumentError("--accuracy or --count: state when to stop")
     if (instrument is None) == bool(kind.components):

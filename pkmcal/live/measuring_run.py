@@ -10,7 +10,6 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import suppress
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -20,12 +19,13 @@ from pkmcal.arrays import FloatArray
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.robot import Robot
 from pkmcal.live.course import Course
-from pkmcal.live.device import DeviceError, Instrument, Machine
+from pkmcal.live.device import FARTHEST, DeviceError, Instrument, Machine
 from pkmcal.live.row_log import RowLog
 
 _THERE, _TURNED = 0.02, 1e-3  # mm and rad by which a controller may be off the pose asked for
 _SAME = 0.5  # mm by which its drives may be off its place by the robot file
-_STEP, _LEAST = 5.0, 8  # mm between points of a way that are looked at, and how many at least
+_STEP = 5.0  # mm between points of a way that are looked at
+_LEAST, _MOST = 8, 4000  # how many at least; a way with more leaves the limits
 _DONE = 0.1  # mm, and 1e-3 rad: a row so near to a candidate is of it
 
 
@@ -125,6 +125,19 @@ class MeasuringRun:
         if self._moving.is_set():
             self._machine.stop()
 
+    def _end_of_move(self) -> None:
+        """Stop the machine, also where Ctrl-C comes once more before it has heard."""
+
+        def stop() -> None:
+            try:
+                self._machine.stop()
+            except DeviceError as error:
+                self._tell(f"the machine did not take the stop, stop it by hand: {error}")
+
+        stopping = threading.Thread(target=stop)
+        stopping.start()
+        stopping.join()
+
     def _drive(self, pose: FloatArray) -> None:
         """One straight move within the limits."""
         self._require_running()
@@ -135,8 +148,7 @@ class MeasuringRun:
             self._require_running()  # else it was stopped, and that is what it says
             raise
         except BaseException:  # Ctrl-C while it moves
-            with suppress(DeviceError):
-                self._machine.stop()
+            self._end_of_move()
             raise
         finally:
             self._moving.clear()
@@ -177,7 +189,7 @@ class MeasuringRun:
 
     def _require_within(self, start: FloatArray, end: FloatArray) -> None:
         """Refuse a move that leaves strokes, cones or the box; where it began may be outside."""
-        points = max(_LEAST, int(np.abs(end - start)[:3].max() / _STEP))
+        points = int(np.clip(np.abs(end - start)[:3].max() / _STEP, _LEAST, _MOST))
         share = np.linspace(0.0, 1.0, points + 1)[1:, None]
         way = start + share * (end - start)
         inside = self._robot.feasible(way).ok
@@ -232,6 +244,11 @@ class MeasuringRun:
             found.append(self._instrument.read(wanted + which))
         self._require_running()
         seen = np.array(found)
+        if (np.abs(seen) > FARTHEST).any():  # NaN is not
+            raise DeviceError(
+                f"at {wanted} the instrument reads {seen[np.abs(seen) > FARTHEST][0]:g}: no such"
+                " place is near"
+            )
         seen = seen[np.isfinite(seen).all(axis=1)]
         return seen if len(seen) else None
 

@@ -48,7 +48,7 @@ def test_a_gauge_with_a_button_sends_one_line(terminal: tuple[int, str]) -> None
     os.write(master, b"+9.9999\r\n")  # pressed before it was asked: not this reading
     time.sleep(0.05)
     gauge = SerialGauge(port, MM)
-    later(master, b"+0.12", b"34\r\n")
+    later(master, b"+0.12", b"34\r\n", pause=0.4)  # a person's finger is slower than a line
     np.testing.assert_array_equal(gauge.read(""), [0.1234])
     gauge.close()
 
@@ -96,14 +96,30 @@ def test_a_gauge_that_is_pulled_out_is_said() -> None:
 @pytest.mark.parametrize(
     ("line", "number"),
     [(b"+0.1234", 0.1234), (b"-12,5 mm", -12.5), (b"01A+000.123", 0.123), (b"X 0.01in", 0.254),
-     (b"+ 3.5", 3.5), (b"D: 7", 7.0)],
+     (b"+ 3.5", 3.5), (b"D: 7 mm", 7.0)],
 )  # fmt: skip
 def test_lines_of_gauges(line: bytes, number: float) -> None:
     assert _number(line, "x") == pytest.approx(number, rel=1e-12)
 
 
 @pytest.mark.parametrize(
-    "line", [b"", b"ERR", b"1.2.3", b"1 2", b"+0.1 um", b"nan", b"0x10", b"1e5"]
+    "line",
+    [
+        b"",
+        b"ERR",
+        b"1.2.3",
+        b"1 2",
+        b"+0.1 um",
+        b"nan",
+        b"0x10",
+        b"1e5",
+        b"ERR 2",
+        b"Err0",
+        b"911",
+        b"Error 1.5",
+        b"234",
+        b"LOW BAT 1.0",
+    ],
 )
 def test_lines_that_are_no_single_number_are_refused(line: bytes) -> None:
     with pytest.raises(DeviceError, match="no single number"):
