@@ -29,6 +29,7 @@ class Machine:
         self.homed, self.stopped, self.mesh = True, False, "none"
         self.lines: list[str] = []
         self.looks = 0  # that a move lasts
+        self.dead = False
         self.stuck = False  # it says ok, and does not move
         self.session: int | None = None
         self.sessions = 0
@@ -148,6 +149,8 @@ class _Grbl(socketserver.StreamRequestHandler):
         self._say("Grbl 3.7 [FluidNC v3.7.8 (wifi) '$' for help]")
         line = b""
         while byte := self.rfile.read(1):
+            if m.dead:
+                return
             if byte == b"?":
                 m.look()
                 state = (
