@@ -24,6 +24,7 @@ from pkmcal.live import registry
 from pkmcal.live.course import UNSTATED, Course
 from pkmcal.live.device import Instrument, Machine
 from pkmcal.live.measuring_run import MeasuringRun, Rules, measured_already
+from pkmcal.live.person import Ask
 from pkmcal.live.replay import places, replayed
 from pkmcal.live.row_log import RowLog
 from pkmcal.measurements.measurement_csv import read_measurements
@@ -103,6 +104,7 @@ def driven(
     out: str,
     inputs: Inputs,
     tell: Tell,
+    ask: Ask | None = None,
 ) -> Driven:
     """Connect machine and instrument, and open the log, or go on with one that is there.
 
@@ -121,6 +123,8 @@ def driven(
         Reads files.
     tell : callable
         Takes lines on what happens.
+    ask : callable, optional
+        Asks a person and returns what is typed; by default the terminal does.
 
     Raises
     ------
@@ -164,9 +168,9 @@ def driven(
             robot, candidates, done=done, measured=_there(log.rows, robot, sigma, job), **options
         )
         course = _course(job, choice, stated, options, log.rows, len(done))
-        opened.append(registry.machine(machine, robot))
+        opened.append(registry.machine(machine, robot, ask))
         if instrument is not None:
-            opened.append(registry.instrument(instrument, kind.units))
+            opened.append(registry.instrument(instrument, kind.units, ask))
     except BaseException:
         _close(opened)
         raise

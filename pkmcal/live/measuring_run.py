@@ -108,9 +108,9 @@ class MeasuringRun:
                 self._drive(place)
             self._wait(self._rules.dwell)
             actuators = self._arrived(pose)
-            values = self._read(f"row {_count(course) + 1}, at {_words(pose)}")
+            values = self._read(f"row {_count(course) + 1}, at {pose_words(pose)}")
             if values is None:
-                self._tell(f"at {_words(pose)} nothing was seen: no row, and not again")
+                self._tell(f"at {pose_words(pose)} nothing was seen: no row, and not again")
                 course = course.without(index)
                 continue
             self._log.append(actuators, values, round(time.time(), 1))
@@ -197,8 +197,8 @@ class MeasuringRun:
         first = int(np.argmax(inside)) if not began else 0  # it may come in from outside
         if not inside[first:].all() or not inside[-1]:
             raise ArgumentError(
-                f"the way from {_words(start)} to {_words(end)} leaves the limits of"
-                f" {self._robot.name} at {_words(way[first:][~inside[first:]][0])}: choose"
+                f"the way from {pose_words(start)} to {pose_words(end)} leaves the limits of"
+                f" {self._robot.name} at {pose_words(way[first:][~inside[first:]][0])}: choose"
                 " --safe-height, --within or --poses"
             )
 
@@ -212,9 +212,9 @@ class MeasuringRun:
         off = np.abs(found - said.pose)[known]
         if not np.isfinite(off).all() or off[:3].max() > _SAME:
             raise DeviceError(
-                f"the controller says it is at {_words(said.pose)}, and its drives are at"
-                f" {_words(found)} by the robot file: it is not the machine of this file, or its"
-                " numbers have changed; import its configuration again"
+                f"the controller says it is at {pose_words(said.pose)}, and its drives are at"
+                f" {pose_words(found)} by the robot file: it is not the machine of this file, or"
+                " its numbers have changed; import its configuration again"
             )
 
     def _arrived(self, pose: FloatArray) -> FloatArray:
@@ -225,8 +225,8 @@ class MeasuringRun:
             off = np.where(np.isfinite(off), off, 0.0)
             if off[:3].max() > _THERE or off[3:].max() > _TURNED:
                 raise DeviceError(
-                    f"sent to {_words(pose)}, the controller is at {_words(said.pose)}: an offset"
-                    " or a mesh bends its moves; switch it off"
+                    f"sent to {pose_words(pose)}, the controller is at {pose_words(said.pose)}:"
+                    " an offset or a mesh bends its moves; switch it off"
                 )
         if said.actuators is not None:
             return said.actuators
@@ -279,7 +279,7 @@ def _count(course: Course) -> int:
     return 0 if course.rows is None else len(course.rows)
 
 
-def _words(pose: FloatArray) -> str:
+def pose_words(pose: FloatArray) -> str:
     """A pose in words, without what it does not have."""
     shown = np.r_[pose[:3], np.degrees(pose[3:])]
     names = ("x", "y", "z", "alpha", "beta", "gamma")

@@ -22,7 +22,7 @@ def _ask(question: str) -> str:
 class PersonDrives:
     """A machine that a person drives to each pose."""
 
-    ADDRESS = ""
+    ADDRESS, ASKS = "", True
 
     def __init__(self, address: str, robot: Robot, ask: Ask = _ask) -> None:
         self._axes, self._ask = robot.coordinates, ask
@@ -55,7 +55,7 @@ class PersonDrives:
 class PersonReads:
     """An instrument that a person reads and types: numbers in mm and deg, or - for nothing."""
 
-    ADDRESS = ""
+    ADDRESS, ASKS = "", True
 
     def __init__(self, address: str, units: tuple[str, ...], ask: Ask = _ask) -> None:
         self._units, self._ask = units, ask
