@@ -43,7 +43,8 @@ class Measurer:
     Parameters
     ----------
     words : text file
-        Lines of JSON: ``start``, ``type`` with a text, ``stop``; their end is ``stop``, too.
+        Lines of JSON: ``start``, ``type`` with a text and the number of the question that it
+        answers, ``stop``; their end is ``stop``, too.
     answers : text file
         Lines of JSON.
     """
@@ -52,7 +53,9 @@ class Measurer:
         self._words, self._answers = words, answers
         self._speaking = threading.Lock()
         self._stopped = threading.Event()
-        self._started, self._typed = queue.Queue[bool](), queue.Queue[str | None]()
+        self._started = queue.Queue[bool]()
+        self._typed = queue.Queue[tuple[object, str] | None]()
+        self._questions, self._out = 0, ""
         self._driven: Driven | None = None
 
     def run(self) -> None:
@@ -112,7 +115,7 @@ class Measurer:
                 if said["do"] == "start":
                     self._started.put(True)
                 elif said["do"] == "type":
-                    self._typed.put(str(said["text"]))
+                    self._typed.put((said["number"], str(said["text"])))
                 else:
                     break
         finally:
@@ -133,10 +136,13 @@ class Measurer:
 
     def _ask(self, question: str) -> str:
         self._require_running()
-        self._send({"asked": question.strip()})
-        text = self._typed.get()
-        self._require_running()
-        return text or ""
+        self._questions += 1
+        self._send({"asked": question.strip(), "number": self._questions})
+        while (typed := self._typed.get()) is not None:
+            number, text = typed
+            if number == self._questions:  # Enter twice does not answer the next question
+                return text
+        raise Stopped
 
     def _require_running(self) -> None:
         if self._stopped.is_set():

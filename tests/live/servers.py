@@ -29,7 +29,7 @@ class Machine:
         self.homed, self.stopped, self.mesh = True, False, "none"
         self.lines: list[str] = []
         self.looks = 0  # that a move lasts
-        self.dead = False
+        self.dead = self.long = False
         self.stuck = False  # it says ok, and does not move
         self.session: int | None = None
         self.sessions = 0
@@ -42,7 +42,7 @@ class Machine:
         if words.get("G") == "1" or "G1" in line:
             if self.stuck:
                 return
-            self.looks = 3
+            self.looks = 10**6 if self.long else 3
             self.goal = np.array(
                 [float(words.get(axis, old)) for axis, old in zip("XYZ", self.goal, strict=True)]
             )
