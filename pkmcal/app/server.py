@@ -26,7 +26,7 @@ from pkmcal.app.commands import commands
 from pkmcal.app.folder import MOST_FILE, MOST_FOLDER, UPLOAD, Folder
 from pkmcal.app.guard import Application, Guard
 from pkmcal.app.process import Message, Worker
-from pkmcal.exceptions import Error
+from pkmcal.exceptions import Error, of_system
 from pkmcal.jobs.stated import quoted
 from pkmcal.view import scripts
 
@@ -125,7 +125,7 @@ class Server:
         except Error as error:
             return _refused(400, str(error))
         except OSError as error:  # a full disk, a folder that may only be read
-            return _refused(507, str(error))
+            return _refused(507, of_system(error))
         return self._changed(request, taken)
 
     async def undo(self, request: Request) -> Response:
@@ -139,7 +139,7 @@ class Server:
         except Error as error:
             return _refused(400, str(error))
         except OSError as error:
-            return _refused(507, str(error))
+            return _refused(507, of_system(error))
 
     def _changed(self, request: Request, taken: bool) -> Response:
         if not taken:

@@ -1,6 +1,6 @@
 // The window: five screens over one project that the server keeps, and files that are given to it.
 import * as server from './transport.js'
-import { STEPS, app, attempt, change, frame, go, made, refresh, said, trouble, work } from './frame.js'
+import { STEPS, app, attempt, change, frame, go, made, refresh, said, stepOf, trouble, work } from './frame.js'
 
 // each screen is fetched when it is first shown
 for (const [step] of STEPS) app.screens[step] = async main => (await import(`./${step}.js`))[step](main)
@@ -20,7 +20,9 @@ attempt(async () => {
   app.project = await server.state()
   frame()
   if (app.project.trouble) trouble(app.project.trouble)
-  await go(app.project.commands.result.length ? 'result' : 'machine', false)
+  const first = stepOf(location.hash) ?? (app.project.commands.result.length ? 'result' : 'machine')
+  history.replaceState(null, '', `#${first}`)
+  await go(first, false)
   document.body.dataset.ready = ''
   for await (const message of server.changes()) {
     if (message.changed === app.project.version) continue

@@ -125,7 +125,11 @@ async function changing(edit) {
   const table = structuredClone(app.project.state)
   edit(table)
   for (const [name, part] of Object.entries(table)) if (part && typeof part === 'object' && !Object.keys(part).length) delete table[name]
-  return taken(await server.change(table, app.project.version))
+  const answer = await server.change(table, app.project.version).catch(async error => {
+    await refresh() // what was ticked or typed is not so
+    throw error
+  })
+  return taken(answer)
 }
 
 export async function undo() {
@@ -149,6 +153,7 @@ const ready = {
 
 export function frame() {
   const { project } = app
+  document.title = `${project.folder.split(/[\\/]/).pop()} – pkmcal`
   if (!$('steps').children.length) STEPS.forEach(([step, text], k) => button(made('li', $('steps')), `${k + 1} ${text}`, () => go(step)))
   STEPS.forEach(([step], k) => {
     const one = $('steps').children[k].firstElementChild
@@ -164,9 +169,11 @@ export function frame() {
   $('terminal').querySelector('button').onclick = () => attempt(() => navigator.clipboard.writeText($('terminal').querySelector('pre').textContent))
 }
 
-export async function go(step, focus = true) {
+// Show a screen; the browser's way back leads to the one before, and a reload shows it again.
+export async function go(step, focus = true, keep = false) {
   if (!ready[step](app.project)) step = 'machine' // as after undo
   if (step !== app.step) said([])
+  if (!keep && `#${step}` !== location.hash) history.pushState(null, '', `#${step}`)
   app.step = step
   app.refresh = null
   app.picture?.machine?.dispose?.()
@@ -182,6 +189,10 @@ export async function go(step, focus = true) {
     if (app.step === step && screen.isConnected) app.refresh = show
   })
 }
+
+addEventListener('popstate', () => app.project && go(stepOf(location.hash) ?? 'machine', true, true))
+
+export const stepOf = hash => STEPS.map(([step]) => step).find(step => `#${step}` === hash)
 
 // Show the project as it is now; the screen stays, unless it has nothing to do any more.
 export async function refresh() {

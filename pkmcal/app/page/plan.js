@@ -50,6 +50,7 @@ export async function plan(main) {
     const found = await work('plan', 'choosing poses')
     const split = made('div', null, { className: 'split' })
     again(answer, () => {
+      for (const text of found.said) made('p', answer, { className: 'warn', text })
       const takes = made('div', answer, { className: 'choices' })
       for (const file of found.files) button(takes, `Save ${file}`, () => save(file), { className: 'first' })
       button(takes, 'Print a sheet to fill in', () => print())
