@@ -27,6 +27,7 @@ from pkmcal.app.folder import MOST_FILE, MOST_FOLDER, UPLOAD, Folder
 from pkmcal.app.guard import Application, Guard
 from pkmcal.app.process import Message, Worker
 from pkmcal.exceptions import Error, of_system
+from pkmcal.jobs.plan import GCODE
 from pkmcal.jobs.stated import quoted
 from pkmcal.view import scripts
 
@@ -109,6 +110,7 @@ class Server:
             "commands": commands(folder.project),
             "enter": quoted(["cd", str(folder.path)]),
             "machines": _built_in(),
+            "gcode": GCODE,
         }
 
     async def change(self, request: Request) -> Response:

@@ -161,11 +161,12 @@ def plan(work: Work, state: Table, given: Table, say: Say) -> Table:
     output = Output(Path(PLAN), planning.files(project.plan), inputs, True)
     said = set_aside(output.paths)
     with output.draft() as draft:
-        planning.write(made, draft, inputs.comment())
+        planning.write(project.plan, made, draft, inputs.comment())
     shown = page.machine(made.robot, cloud=False)
     shown["places"] = page.places("planned poses", made.robot, made.poses)
-    return {"text": str(made), "files": [str(each) for each in output.paths], "view": shown,
-            "said": said, "sheet": sheet(made)}  # fmt: skip
+    files = [str(each) for each in output.paths]
+    return {"words": made.paragraphs(), "table": "\n".join(made.tables()), "files": files,
+            "view": shown, "said": said, "sheet": sheet(made)}  # fmt: skip
 
 
 def look(work: Work, state: Table, given: Table, say: Say) -> Table:
@@ -196,7 +197,7 @@ def look(work: Work, state: Table, given: Table, say: Say) -> Table:
         "notes": list(
             dict.fromkeys([*work.notes, *(note for each in measured for note in each.notes)])
         ),
-        "text": [str(each) for each in measured],
+        "text": [looking.listed(each, machine) for each in measured],
     }
 
 

@@ -6,10 +6,8 @@ import socket
 import subprocess
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-import pkmcal as pk
 from pkmcal.app.aside import set_aside
 from pkmcal.files.seal import sealed
 from pkmcal.jobs.calibration import Calibration
@@ -111,7 +109,7 @@ def test_readings_that_were_written_into_a_plan_outlive_the_next_plan(tmp_path: 
         take_hexapod(page)
         page.get_by_role("button", name="2 Plan").click()
         page.get_by_label("poses", exact=True).fill("8")
-        page.locator("pre", has_text="measure 8 poses").wait_for()
+        page.locator("p.state", has_text="measure 8 poses").wait_for()
         file = served.folder / "plan" / "commands.csv"
         filled = file.read_text().replace("\n", ",1.0\n")
         file.write_text(filled)

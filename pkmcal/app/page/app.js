@@ -3,7 +3,7 @@ import * as server from './transport.js'
 import { STEPS, app, attempt, change, frame, go, made, refresh, said, stepOf, trouble, work } from './frame.js'
 
 // each screen is fetched when it is first shown
-for (const [step] of STEPS) app.screens[step] = async main => (await import(`./${step}.js`))[step](main)
+for (const { dataset: { step } } of STEPS) app.screens[step] = async main => (await import(`./${step}.js`))[step](main)
 window.workbench = app // what tests ask
 addEventListener('unhandledrejection', event => trouble(event.reason?.message ?? String(event.reason)))
 

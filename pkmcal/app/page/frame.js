@@ -1,7 +1,7 @@
 // What is around the screens: the steps, what is wrong, what is running, the lines for a terminal.
 import * as server from './transport.js'
 
-export const STEPS = [['machine', 'Machine'], ['plan', 'Plan'], ['measure', 'Measure'], ['result', 'Result'], ['out', 'Take away']]
+export const STEPS = [...document.querySelectorAll('#steps button')] // painted before anything is asked
 export const app = { step: 'machine', project: null, screens: {}, picture: null, times: {} }
 const $ = id => document.getElementById(id)
 
@@ -154,13 +154,13 @@ const ready = {
 export function frame() {
   const { project } = app
   document.title = `${project.folder.split(/[\\/]/).pop()} – pkmcal`
-  if (!$('steps').children.length) STEPS.forEach(([step, text], k) => button(made('li', $('steps')), `${k + 1} ${text}`, () => go(step)))
-  STEPS.forEach(([step], k) => {
-    const one = $('steps').children[k].firstElementChild
+  for (const one of STEPS) {
+    const { step } = one.dataset
+    one.onclick = () => attempt(() => go(step))
     if (step === app.step) one.setAttribute('aria-current', 'step')
     else one.removeAttribute('aria-current')
     one.disabled = !ready[step](project)
-  })
+  }
   $('undo').hidden = !project.undo
   $('undo').onclick = () => attempt(undo)
   const lines = project.commands[app.step] ?? []
@@ -192,7 +192,7 @@ export async function go(step, focus = true, keep = false) {
 
 addEventListener('popstate', () => app.project && go(stepOf(location.hash) ?? 'machine', true, true))
 
-export const stepOf = hash => STEPS.map(([step]) => step).find(step => `#${step}` === hash)
+export const stepOf = hash => STEPS.find(one => `#${one.dataset.step}` === hash)?.dataset.step
 
 // Show the project as it is now; the screen stays, unless it has nothing to do any more.
 export async function refresh() {
