@@ -87,8 +87,9 @@ def firmware_of(job: Planning) -> Firmware:
 def program(job: Planning, made: Plan, head: str) -> str:
     """Return the program that drives to the poses of a plan, in its order.
 
-    It homes, goes to the machine's home, and on in straight lines, all of which were looked at;
-    it rises to the safe height between poses where one is stated, or where a printer probes.
+    It homes, goes to the machine's home, and on in straight lines, all of which were looked at,
+    by way of home where a line would leave the limits. It rises to the safe height between poses
+    where one is stated, or where a printer probes.
 
     Parameters
     ----------
@@ -134,43 +135,56 @@ def program(job: Planning, made: Plan, head: str) -> str:
         above = pose.copy()
         if probed:
             above[2] += height or 0.0
-        way = _way(at, above, height)
-        for begin, end in pairwise(way):
-            _require_within(robot, begin, end, f"to pose {k + 1}")
-        lines += [_move(robot, each) for each in way[1:]]
+        way = _way(robot, at, above, height, f"to pose {k + 1}")
+        lines += [_move(robot, each) for each in way]
         if probed and firmware.probe is not None:
             lines.append(firmware.probe.format(x=_number(pose[0]), y=_number(pose[1])))
         else:
             lines.append(firmware.pause.format(ms=1000.0 * job.dwell, s=job.dwell))
         at = pose
-    way = _way(at, robot.home, height)
-    for begin, end in pairwise(way):
-        _require_within(robot, begin, end, "back to home")
-    lines += ["; back to home", *(_move(robot, each) for each in way[1:]), *firmware.end]
+    way = _way(robot, at, robot.home, height, "back to home")
+    lines += ["; back to home", *(_move(robot, each) for each in way), *firmware.end]
     return "\n".join(lines) + "\n"
 
 
-def _way(start: FloatArray, end: FloatArray, height: float | None) -> list[FloatArray]:
-    """Poses from one to another, straight or over a height; the first and the last are theirs."""
+def _way(
+    robot: Robot, start: FloatArray, end: FloatArray, height: float | None, where: str
+) -> list[FloatArray]:
+    """Return where to go from one pose to another: straight, or else by way of home.
+
+    Raises
+    ------
+    ValueError
+        Both leave strokes, cones or the box.
+    """
+    straight = _over(start, end, height)
+    for way in (straight, [*_over(start, robot.home, height), *_over(robot.home, end, height)]):
+        if all(_outside(robot, *each) is None for each in pairwise([start, *way])):
+            return way
+    ways = (_outside(robot, *each) for each in pairwise([start, *straight]))
+    place = ", ".join(f"{each:.1f}" for each in next(one for one in ways if one is not None)[:3])
+    raise ArgumentError(
+        f"{OPTION}: the way {where} leaves the limits of {robot.name} at x, y, z = {place} mm:"
+        " state --safe-height, --within or --poses"
+    )
+
+
+def _over(start: FloatArray, end: FloatArray, height: float | None) -> list[FloatArray]:
+    """Return where to go, straight or over a height, to `end`."""
     if height is None:
-        return [start, end]
+        return [end]
     up, over = start.copy(), end.copy()
     up[2], over[2] = max(start[2], height), max(end[2], height)
     way = [start, up, over, end]
-    return [start, *(each for last, each in pairwise(way) if (each != last).any())]
+    return [each for last, each in pairwise(way) if (each != last).any()]
 
 
-def _require_within(robot: Robot, start: FloatArray, end: FloatArray, which: str) -> None:
-    """Refuse a straight way that leaves strokes, cones or the box."""
+def _outside(robot: Robot, start: FloatArray, end: FloatArray) -> FloatArray | None:
+    """Return the first pose of a straight way that is outside of the limits."""
     points = max(_LEAST, int(np.abs(end - start)[:3].max() / _STEP))
-    way = start + np.linspace(0.0, 1.0, points + 1)[1:, None] * (end - start)
+    way: FloatArray = start + np.linspace(0.0, 1.0, points + 1)[1:, None] * (end - start)
     inside = robot.feasible(way).ok
-    if not inside.all():
-        place = ", ".join(f"{each:.1f}" for each in way[~inside][0, :3])
-        raise ArgumentError(
-            f"{OPTION}: the way {which} leaves the limits of {robot.name} at x, y, z = {place} mm:"
-            " state --safe-height, --within or --poses"
-        )
+    return None if inside.all() else way[np.argmin(inside)]
 
 
 def _move(robot: Robot, pose: FloatArray) -> str:

@@ -1,11 +1,14 @@
 // The window: five screens over one project that the server keeps, and files that are given to it.
 import * as server from './transport.js'
-import { STEPS, app, attempt, change, frame, go, made, refresh, said, stepOf, trouble, work } from './frame.js'
+import { STEPS, app, attempt, change, frame, go, made, refresh, said, trouble, work } from './frame.js'
 
 // each screen is fetched when it is first shown
 for (const { dataset: { step } } of STEPS) app.screens[step] = async main => (await import(`./${step}.js`))[step](main)
 window.workbench = app // what tests ask
 addEventListener('unhandledrejection', event => trouble(event.reason?.message ?? String(event.reason)))
+
+const stepOf = hash => STEPS.find(one => `#${one.dataset.step}` === hash)?.dataset.step
+addEventListener('popstate', () => app.project && go(stepOf(location.hash) ?? 'machine', true, true))
 
 // a file that misses its place must not take the page's
 addEventListener('dragover', event => { event.preventDefault(); document.body.classList.add('over') })

@@ -125,16 +125,8 @@ async function changing(edit) {
   const table = structuredClone(app.project.state)
   edit(table)
   for (const [name, part] of Object.entries(table)) if (part && typeof part === 'object' && !Object.keys(part).length) delete table[name]
-  const answer = await server.change(table, app.project.version).catch(async error => {
-    await refresh() // what was ticked or typed is not so
-    throw error
-  })
-  return taken(answer)
-}
-
-export async function undo() {
-  said([])
-  if (await taken(await server.undo(app.project.version))) await refresh()
+  const back = async error => { await refresh(); throw error } // what was ticked or typed is not so
+  return taken(await server.change(table, app.project.version).catch(back))
 }
 
 async function taken(answer) {
@@ -162,7 +154,10 @@ export function frame() {
     one.disabled = !ready[step](project)
   }
   $('undo').hidden = !project.undo
-  $('undo').onclick = () => attempt(undo)
+  $('undo').onclick = () => attempt(async () => {
+    said([])
+    if (await taken(await server.undo(app.project.version))) await refresh()
+  })
   const lines = project.commands[app.step] ?? []
   $('terminal').hidden = !lines.length
   $('terminal').querySelector('pre').textContent = [project.enter, ...lines].join('\n')
@@ -189,10 +184,6 @@ export async function go(step, focus = true, keep = false) {
     if (app.step === step && screen.isConnected) app.refresh = show
   })
 }
-
-addEventListener('popstate', () => app.project && go(stepOf(location.hash) ?? 'machine', true, true))
-
-export const stepOf = hash => STEPS.find(one => `#${one.dataset.step}` === hash)?.dataset.step
 
 // Show the project as it is now; the screen stays, unless it has nothing to do any more.
 export async function refresh() {
