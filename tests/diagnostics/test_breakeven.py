@@ -99,6 +99,5 @@ def test_it_is_in_the_result_as_json():
 
 def test_the_summary_says_it():
     found = identified("pose")
-    assert "double on the whole if base*, platform* are wrong by" in found.summary().replace(
-        "\n  ", " "
-    )
+    line = "double on the whole if base*, platform* are wrong by"
+    assert line in found.summary().replace("\n  ", " ")

@@ -109,3 +109,36 @@ def test_a_height_that_is_exactly_zero_is_no_evidence_for_held_out_points(name: 
         assert with_zeros.holdout_expected == pytest.approx(alone.holdout_expected, rel=1e-3)
         assert with_zeros.holdout_test is not None and alone.holdout_test is not None
         assert with_zeros.holdout_test.chance == pytest.approx(alone.holdout_test.chance, rel=0.02)
+
+
+@pytest.mark.filterwarnings("ignore:.*further than errors of a machine")
+@pytest.mark.parametrize("name", [*STILL, "five-bar"])
+@pytest.mark.parametrize("wrong", ["late", "two machines"])
+def test_what_is_wrong_of_other_components_is_seen_beside_exact_zeros(
+    name: str, wrong: str
+) -> None:
+    """Zeros whose noise is rounding were taken for a fit of which nothing but rounding is left."""
+    rng = np.random.default_rng(4)
+    robot = pk.load(name)
+    units = dict(zip(robot.geometry.names, robot.geometry.units, strict=True))
+
+    def read(at: np.ndarray) -> np.ndarray:
+        sizes = {free: 0.2 if units[free] == "mm" else 6e-4 for free in robot.model.free}
+        true = robot.replace({free: robot.geometry[free] + size * rng.normal()
+                              for free, size in sizes.items()})  # fmt: skip
+        return true.forward(robot.inverse(at), guess=at).pose + rng.normal(0, 1, at.shape) * (
+            np.repeat([NOISE, TURNING], 3)
+        )
+
+    at = pk.sample_poses(robot, 45, seed=3, share=0.5)
+    values = read(at)
+    if wrong == "late":
+        values[1:] += 4e-3 * (values[:-1] - values[1:])
+    else:
+        values[1::2] = read(at)[1::2]
+    values[:, STILL.get(name, [2])] = 0.0
+    kind = "position" if name == "five-bar" else "pose"
+    values = values[:, :3] if kind == "position" else values
+    found = pk.identify(robot, pk.Measurements(robot.inverse(at), values, kind), holdout=0.25)
+    wanted = "late-readings" if wrong == "late" else "two-machines"
+    assert wanted in {said.check for said in found.verdict.said if said.level == "doubt"}
