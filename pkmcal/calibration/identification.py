@@ -28,9 +28,11 @@ from pkmcal.display import Table
 from pkmcal.effects.expansion import in_words as heat_in_words
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.fitted.held_numbers import considered_places
+from pkmcal.fitted.instruments import CalibratedPicture, instruments, pictures
 from pkmcal.fitted.row_names import row_names
 from pkmcal.fitted.solution import Machine, Solution
 from pkmcal.kinematics.calibratable import as_machine
+from pkmcal.readings.reading import Reading
 from pkmcal.result import Result
 
 if TYPE_CHECKING:
@@ -143,6 +145,21 @@ class Identification(Solution[Machine], Result):
             "start": self.start,
             "change": self.values - self.start,
         }
+
+    @cached_property
+    def instruments(self) -> tuple[Reading, ...]:
+        """The instrument of each set as it was found: a camera with its lens where it is.
+
+        Of sessions that of the last row's.
+        """
+        equations, theta = self.fit.equations, self.fit.end.theta
+        sets = range(len(equations.table.sets))
+        return tuple([*instruments(equations, theta, i)][-1][1] for i in sets)
+
+    @cached_property
+    def pictures(self) -> tuple[CalibratedPicture, ...]:
+        """What each picture of a board shows beside the calibration; empty without a camera."""
+        return tuple(pictures(self))
 
     def robot_of(self, session: str) -> Machine:
         """The machine with the numbers that it had in a session.

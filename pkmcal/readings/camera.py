@@ -11,7 +11,7 @@ scatter is then no noise of the corners, and is estimated beside it (`tells_actu
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from os import PathLike
 from typing import Any, ClassVar, Literal, get_args
@@ -32,6 +32,7 @@ from pkmcal.readings.lens import FOUND, LENS, Found, numbers_of_lens
 from pkmcal.readings.lens_doubts import lens_doubts
 from pkmcal.readings.lens_files import read_lens
 from pkmcal.readings.measured import InFit, Measured
+from pkmcal.readings.pictures import Picture, pictures
 from pkmcal.readings.predicted import At, Lots, Predicted, Shared
 from pkmcal.readings.reading import Reading, Sets, Solve
 from pkmcal.readings.seen_places import tool_places
@@ -271,6 +272,42 @@ class Camera(Reading):
             sizes = {self.board_name: number}
             yield Dependence("size", "size", np.zeros((count, 1)), sizes, every)
 
+    def as_found(self, numbers: Mapping[str, float]) -> Camera:
+        """The camera where it is, with its lens, before a board of its size."""
+
+        def place(stem: str) -> FloatArray:
+            return np.array([numbers[f"{stem}.{axis}"] for axis, _ in PLACE])
+
+        stem = _dotted("lens", self.camera_name)
+        lens = {name: numbers.get(f"{stem}.{name}", getattr(self, name)) for name in LENS}
+        size = 1.0 + numbers.get(_dotted("board", self.board_name, "size"), 0.0)
+        found: dict[str, Any] = {
+            "lens": "none",
+            "find_size": False,
+            "stands": place(_dotted("frame", self.frame_name)),
+            "carried": place(_dotted("tool", self._carried_thing)),
+        }
+        if self.corner is not None:
+            found["corner"] = np.asarray(self.corner, dtype=np.float64) * size
+        return self.with_fields(found | lens)
+
+    def pictures(self, m: Measured, pose: FloatArray, off: FloatArray) -> list[Picture]:
+        """Tell where each picture shows the board, and where the machine says that it is."""
+        lots = Lots(np.arange(len(pose)), np.arange(len(pose)))
+        at = At(pose, frame=np.asarray(self.stands, dtype=np.float64))
+        shared = self.shared(at, lots, tool=np.asarray(self.carried, dtype=np.float64))
+        motion, corner = self._boards(pose), self._corners(len(m))
+        return pictures(self._pictures(m), motion, corner, shared.by_motion, off, self.fx)
+
+    def _boards(self, pose: FloatArray) -> FloatArray:
+        """Boards (N, 4, 4) in axes of a camera whose place is known."""
+        stands, carried = (
+            screws.frames(np.asarray(each, dtype=np.float64)[None])
+            for each in (self.stands, self.carried)
+        )
+        board: FloatArray = stands @ screws.frames(np.ascontiguousarray(pose)) @ carried
+        return board if self.on == "base" else np.linalg.inv(board)
+
     def starts(self, machine: Any, sets: Sets, found: Starts) -> None:
         """Start at the platform; `places_seen` finds the place together with the frame."""
         for data, _ in sets:
@@ -312,16 +349,8 @@ class Camera(Reading):
         stands = as_rows("stands", self.stands, 6)[0][0]
         at = At(solve(m.actuators, "q").pose, frame=stands)
         seen = self.predict(at, **self.arguments(m)).values
-        base, moved, mounted = (
-            screws.frames(stands[None]),
-            screws.frames(at.pose),
-            self.arguments(m),
-        )
-        board = base @ moved @ screws.frames(mounted["tool"][None])
-        if self.on == "platform":
-            board = np.asarray(np.linalg.inv(board), dtype=np.float64)
         size = (self.width, self.height)
-        seen[~visible(board, self._corners(len(m)), seen, self.lens_numbers(), size)] = np.nan
+        seen[~visible(self._boards(at.pose), self._corners(len(m)), seen, self.lens_numbers(), size)] = np.nan
         return seen
 
     # units ----------------------------------------------------------------------------------------

@@ -214,6 +214,21 @@ class Reading:
         """
         return m.values
 
+    def as_found(self: Own, numbers: Mapping[str, float]) -> Own:
+        """The instrument with what a calibration found of it, by the names of its numbers.
+
+        By default itself.
+        """
+        return self
+
+    def pictures(self, m: Measured, pose: FloatArray, off: FloatArray) -> Sequence[Any]:
+        """Tell what each picture shows, of readings that are taken in pictures; else nothing.
+
+        Of an instrument as it was found. `pose` (N, 6) are those of the machine where its actuators
+        say that it is, `off` (N, k) measured less predicted there.
+        """
+        return ()
+
     def follows_pose(self, machine: Any) -> bool:
         """Return whether it follows from one pose of the platform, wherever the actuators are."""
         return True
