@@ -11,7 +11,7 @@ scatter is then no noise of the corners, and is estimated beside it (`tells_actu
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from typing import Any, ClassVar, Literal, get_args
@@ -28,7 +28,7 @@ from pkmcal.readings import rows, twists
 from pkmcal.readings.alignment import Laid, Sighting, frame_of_poses
 from pkmcal.readings.board_poses import mm_per_pixel, pictures_told
 from pkmcal.readings.boards import Board
-from pkmcal.readings.lens import FOUND, LENS, Found, numbers_of_lens
+from pkmcal.readings.lens import FOUND, LENS, Found, covariance_of_lens, numbers_of_lens
 from pkmcal.readings.lens_doubts import lens_doubts
 from pkmcal.readings.lens_files import read_lens
 from pkmcal.readings.measured import InFit, Measured
@@ -75,6 +75,9 @@ class Camera(Reading):
     lens : {"none", "focal", "all"}
         What of the lens is to be found beside the machine, from these values on: "focal" is fx fy
         cx cy, "all" k1 k2 p1 p2 as well: ``lens.fx`` …. State a prior where it is known roughly.
+    lens_sigma : (9,) or (9, 9) array, optional
+        Standard deviations of the nine numbers, or their covariance, where the lens was calibrated
+        before: it is then fitted along within these, where `lens` finds nothing of it.
     find_size : bool
         Whether the board may be larger than stated, by ``board.size`` (0.001: by 0.1 %).
     camera_name, board_name : str
@@ -116,6 +119,7 @@ class Camera(Reading):
     height: int = 0
     lens: Found = "none"
     find_size: bool = False
+    lens_sigma: ArrayLike | None = None
     board: Board | None = None
     camera_name: str = ""
     board_name: str = ""
@@ -260,9 +264,10 @@ class Camera(Reading):
         yield always("tool", "tool", PLACE, [self._carried_thing] * count, data.starts)
         yield Dependence("corner", "corner", self._corners(count), {}, every)
         lens = np.tile(self.lens_numbers(), (count, 1))
-        slots = FOUND[self.lens]
-        found = {self.camera_name: self._lens_found(m, slots)} if slots else {}
-        yield Dependence("lens", "lens", lens, found, every)
+        known = None if self.lens != "none" else self._lens_known()
+        slots = FOUND[self.lens] if known is None else np.flatnonzero(np.diagonal(known)).tolist()
+        found = {self.camera_name: self._lens_found(m, slots, known)} if slots else {}
+        yield Dependence("lens", "lens" if known is None else "lens as stated", lens, found, every)
         if self.find_size:
             extent = float(np.abs(self._corners(count)).max(initial=1.0))
             number = Numbers(
@@ -283,6 +288,7 @@ class Camera(Reading):
         size = 1.0 + numbers.get(_dotted("board", self.board_name, "size"), 0.0)
         found: dict[str, Any] = {
             "lens": "none",
+            "lens_sigma": None,
             "find_size": False,
             "stands": place(_dotted("frame", self.frame_name)),
             "carried": place(_dotted("tool", self._carried_thing)),
@@ -387,6 +393,8 @@ class Camera(Reading):
                 " lens file (Camera.from_file), or state about 1.2 times the width of the pictures"
                 ' and lens="all"'
             )
+        if self.lens_sigma is not None:
+            covariance_of_lens(self.lens_sigma)
         own, read = super().of_rows(values, actuators, targets)
         return own, read
 
@@ -408,10 +416,17 @@ class Camera(Reading):
         """The nine numbers (9,), in the order of `LENS`."""
         return np.array([getattr(self, name) for name in LENS], dtype=np.float64)
 
-    def _lens_found(self, m: Measured, slots: tuple[int, ...]) -> Numbers:
-        """Numbers of the lens that are found."""
+    def _lens_found(
+        self, m: Measured, slots: Sequence[int], known: FloatArray | None
+    ) -> Numbers:
+        """Numbers of the lens that are found, or fitted along as they are known (9, 9)."""
         mm, stem = float(self.mm(m, 1000.0)[0]), _dotted("lens", self.camera_name)
-        return numbers_of_lens(stem, self.lens_numbers(), slots, m.values, mm)
+        return numbers_of_lens(stem, self.lens_numbers(), tuple(slots), m.values, mm, known)
+
+    def _lens_known(self) -> FloatArray | None:
+        """Covariance (9, 9) of the lens; None where it is exact."""
+        known = None if self.lens_sigma is None else covariance_of_lens(self.lens_sigma)
+        return known if known is not None and known.any() else None
 
     def _pictures(self, m: Measured) -> IntArray:
         """Return the picture of each row, (N,), counted from 0."""
