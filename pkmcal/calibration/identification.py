@@ -326,6 +326,8 @@ class Identification(Solution[Machine], Result):
             yield summary.filled("", heat)
         yield summary.misfit_table(self)
         yield summary.quality(self)
+        if self.pictures:
+            yield summary.pictures(self.pictures)
         datasets, chosen = self.fit.equations.prediction.datasets, self.fit.parameters
         framed = len(self.free) > len(chosen.places) or isinstance(self.robot, SerialArm)
         if self.datum.names:

@@ -230,7 +230,8 @@ def calibrate(
         typer.Option(
             rich_help_panel=WRITTEN,
             metavar="DIR",
-            help="Write robot.toml, as calibrated, and residuals.png.",
+            help="Write robot.toml, as calibrated, residuals.png, and of a camera camera.yaml, its"
+            " lens and where it is.",
         ),
     ] = None,
     report: Annotated[
@@ -281,7 +282,7 @@ def carried_out(job: Calibration, asked: Writing, json: bool) -> int:
     inputs = Inputs()
     sources = calibrating.read(job, inputs, tell)
     arguments = calibrating.arguments(job, sources, tell)
-    written = Written.planned(asked, job.robot, sources.robot, inputs)
+    written = Written.planned(asked, job.robot, sources.robot, sources.measured, inputs)
     with progress("identifying"):
         found = calibrating.identified(sources, arguments)
     rigid = None
@@ -324,6 +325,8 @@ def _say_written(written: Written, found: Identification, rigid: object) -> None
         if written.urdf:
             how = f"; {rigid}" if rigid else ""
             say(f"URDF with the joint errors in its origins: {machine.paths[2]}{how}")
+        for path in (each for each in machine.paths if each.name in written.instruments):
+            say(f"camera as found, its lens and where it is: {path}")
     if report is not None:
         say(f"\nreport: {report.paths[0]}")
     first = report or machine

@@ -30,7 +30,7 @@ from pkmcal.readings.board_poses import mm_per_pixel, pictures_told
 from pkmcal.readings.boards import Board
 from pkmcal.readings.lens import FOUND, LENS, Found, covariance_of_lens, numbers_of_lens
 from pkmcal.readings.lens_doubts import lens_doubts
-from pkmcal.readings.lens_files import read_lens
+from pkmcal.readings.lens_files import read_lens, write_lens
 from pkmcal.readings.measured import InFit, Measured
 from pkmcal.readings.pictures import Picture, pictures
 from pkmcal.readings.predicted import At, Lots, Predicted, Shared
@@ -155,6 +155,36 @@ class Camera(Reading):
             Not such a file, or a lens that nine numbers do not describe.
         """
         return Camera(**{**read_lens(path), **others})
+
+    @property
+    def file_name(self) -> str:
+        """The name of the file that `write` makes of it, by the names of camera and board."""
+        return "-".join(filter(None, ("camera", self.camera_name, self.board_name))) + ".yaml"
+
+    def write(self, path: str | PathLike[str], comment: str = "") -> None:
+        """Write lens and `motions` as a lens file, which OpenCV and `from_file` read.
+
+        Parameters
+        ----------
+        path : str or path
+            The file.
+        comment : str
+            Lines for its head, each with its ``#``.
+        """
+        size = self.width, self.height
+        write_lens(path, self.lens_numbers(), size, self.motions, comment)
+
+    @property
+    def motions(self) -> Mapping[str, FloatArray]:
+        """Motions (4, 4), mm, of a camera whose place is known, by what they take to what.
+
+        Of a camera on the base ``base_to_camera`` and ``board_to_platform``, of one on the platform
+        ``base_to_board`` and ``camera_to_platform``, which others call hand-eye calibration.
+        """
+        stands = "camera" if self.on == "base" else "board"
+        names = f"base_to_{stands}", f"{self._carried}_to_platform"
+        places = np.array([self.stands, self.carried], dtype=np.float64)
+        return dict(zip(names, screws.frames(places), strict=True))
 
     def seeing(self, q: ArrayLike, board: Board) -> tuple[FloatArray, Camera]:
         """Actuators (N, n) and the camera for pictures that show a whole board.

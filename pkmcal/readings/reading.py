@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
+from os import PathLike
 from typing import Any, ClassVar, Literal, NamedTuple, Protocol, TypeVar
 
 import numpy as np
@@ -220,6 +221,20 @@ class Reading:
         By default itself.
         """
         return self
+
+    @property
+    def file_name(self) -> str:
+        """The name of the file of an instrument as it was found; "" of those that have none."""
+        return ""
+
+    @property
+    def motions(self) -> Mapping[str, FloatArray]:
+        """Motions (4, 4) of an instrument as it was found, by what they take to what; mm."""
+        return {}
+
+    def write(self, path: str | PathLike[str], comment: str = "") -> None:
+        """Write the instrument as it was found; `comment` are lines for the head of the file."""
+        raise NotImplementedError
 
     def pictures(self, m: Measured, pose: FloatArray, off: FloatArray) -> Sequence[Any]:
         """Tell what each picture shows, of readings that are taken in pictures; else nothing.

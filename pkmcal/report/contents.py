@@ -19,6 +19,7 @@ from pkmcal.estimation.fit_data import FitData
 from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.measurements.iso9283 import performance
 from pkmcal.measurements.repeats import groups
+from pkmcal.readings.constants import names_of_constants
 from pkmcal.report.places import Places
 
 _WORST = 10  # rows that are listed
@@ -82,6 +83,35 @@ def export_command(found: Identification) -> str:
     if isinstance(found.robot, SerialArm) or found.robot.model.controller is None:
         return ""
     return found.robot.model.controller.command("robot.toml")
+
+
+def instruments(found: Identification) -> list[dict[str, Any]]:
+    """List instruments of which a file is written: its name, their numbers, motions in mm."""
+    listed = {}
+    for each in found.instruments:
+        if each.file_name:
+            numbers = {name: getattr(each, name) for name in names_of_constants(each)}
+            listed[each.file_name] = {
+                "file": each.file_name,
+                "numbers": {k: v for k, v in numbers.items() if isinstance(v, int | float)},
+                "motions": {name: motion.tolist() for name, motion in each.motions.items()},
+            }
+    return [*listed.values()]
+
+
+def pictures(found: Identification) -> list[dict[str, Any]]:
+    """List pictures of boards: what each shows beside the calibration; mm, rad and px."""
+    return [
+        {
+            "name": each.name,
+            "use": each.use,
+            "camera": each.camera,
+            "board": each.board,
+            "outliers": each.outliers,
+            **vars(each.seen),
+        }
+        for each in found.pictures
+    ]
 
 
 def directions(found: Identification) -> list[dict[str, Any]]:

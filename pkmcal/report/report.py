@@ -108,6 +108,8 @@ def gather(
         "moved": contents.moved(points),
         "directions": contents.directions(found),
         "parameters": contents.parameters(found),
+        "instruments": contents.instruments(found),
+        "pictures": contents.pictures(found),
         "held_out_numbers": contents.held_out_numbers(found),
         "correlation": contents.correlation(found),
         "iso9283": contents.iso9283(found),
