@@ -29,6 +29,7 @@ from pkmcal.effects.expansion import in_words as heat_in_words
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.fitted.held_numbers import considered_places
 from pkmcal.fitted.instruments import CalibratedPicture, instruments, pictures
+from pkmcal.fitted.machine_accuracy import machine_accuracy
 from pkmcal.fitted.row_names import row_names
 from pkmcal.fitted.solution import Machine, Solution
 from pkmcal.kinematics.calibratable import as_machine
@@ -160,6 +161,13 @@ class Identification(Solution[Machine], Result):
     def pictures(self) -> tuple[CalibratedPicture, ...]:
         """What each picture of a board shows beside the calibration; empty without a camera."""
         return tuple(pictures(self))
+
+    def _by_itself(self) -> FloatArray:
+        """Standard deviation of the platform at the measured poses but for its frames, mm (N,)."""
+        end = self.fit.end
+        at = end.actuators if isinstance(self.robot, SerialArm) else end.pose
+        places = at[np.isfinite(end.pose).all(axis=1)]
+        return machine_accuracy(self.fit, places, places)
 
     def robot_of(self, session: str) -> Machine:
         """The machine with the numbers that it had in a session.
@@ -328,6 +336,7 @@ class Identification(Solution[Machine], Result):
         yield summary.quality(self)
         if self.pictures:
             yield summary.pictures(self.pictures)
+            yield summary.by_itself(self._by_itself())
         datasets, chosen = self.fit.equations.prediction.datasets, self.fit.parameters
         framed = len(self.free) > len(chosen.places) or isinstance(self.robot, SerialArm)
         if self.datum.names:

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from pkmcal import display
-from pkmcal.arrays import BoolArray, rms
+from pkmcal.arrays import BoolArray, FloatArray, rms
 from pkmcal.display import Table, first_rows, printable
 from pkmcal.estimation.identifiability import listed
 from pkmcal.fitted.distances import Distances
@@ -126,6 +126,20 @@ def pictures(listed: Sequence[CalibratedPicture]) -> str:
     worst = max(listed, key=lambda each: np.nan_to_num(each.seen.off_commanded, nan=-1.0))
     shown = f"worst {printable(worst.name)}, {_short(worst.seen.off_commanded)} px in all"
     return filled("", "; ".join([*facts, shown])) if facts else ""
+
+
+def by_itself(deviation: FloatArray) -> str:
+    """How well the machine is known at the measured poses, wherever its frames lie."""
+    sure = deviation[np.isfinite(deviation)]
+    if not len(sure):
+        return filled("", "how the machine moves is not determined at the measured poses")
+    unknown = len(deviation) - len(sure)
+    beyond = f"; not determined at {unknown} of them" if unknown else ""
+    return filled(
+        "",
+        f"the machine is known to ± {_short(rms(sure))} mm at the measured poses, wherever its base"
+        f" and platform are{beyond}",
+    )
 
 
 def _count(dof: float) -> str:

@@ -16,6 +16,7 @@ from pkmcal.display import printable
 from pkmcal.estimation import misfits
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.fit_data import FitData
+from pkmcal.fitted.machine_accuracy import machine_accuracy
 from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.measurements.iso9283 import performance
 from pkmcal.measurements.repeats import groups
@@ -259,14 +260,27 @@ def iso9283(found: Identification) -> list[dict[str, Any]]:
     return scores
 
 
-def expected(found: Identification, places: FloatArray) -> FloatArray:
+def expected(
+    found: Identification, places: FloatArray, reference: FloatArray | None = None
+) -> FloatArray:
     """Predict the standard deviation of the tool, mm (N,), at poses (N, 6) or joints (N, n).
 
     Where the instrument's frame or targets were identified too, that of the first target in the
     instrument's frame: in the base frame it would contain the pose of the base, which no
-    measurement determines.
+    measurement determines. Of an instrument that reads no lengths, as a camera, that of the machine
+    by itself, whose frames are moved over the `reference` places, by default these.
     """
-    return as_seen(found, places) if instrument_identified(found) else found.accuracy(places)
+    if not instrument_identified(found):
+        return found.accuracy(places)
+    if reads_lengths(found):
+        return as_seen(found, places)
+    return machine_accuracy(found.fit, places, places if reference is None else reference)
+
+
+def reads_lengths(found: Identification) -> bool:
+    """Say whether what the first instrument reads, in the last session, are lengths."""
+    data, _ = _first_of_last(found)
+    return data.measured.instrument.units[:1] == ("mm",)
 
 
 def as_seen(found: Identification, places: FloatArray) -> FloatArray:
@@ -325,7 +339,7 @@ def over_the_workspace(
     if places.area is None:
         return sampled, None
     area = places.area
-    return sampled, Slice(area.axes, area.values, area.filled(expected(found, area.poses)))
+    return sampled, Slice(area.axes, area.values, area.filled(expected(found, area.poses, places.poses)))
 
 
 def over_the_measured(found: Identification) -> FloatArray:

@@ -124,6 +124,7 @@ def gather(
         "stiffness": yielding.of(found.robot, None if isinstance(places, str) else places),
         "inputs": checksums(files),
         "instrument_sought": contents.instrument_identified(found),
+        "of_target": contents.reads_lengths(found),
         "arm": isinstance(found.robot, SerialArm),
         "export": contents.export_command(found),
         "version": version(),
@@ -164,7 +165,7 @@ def html(facts: Mapping[str, Any]) -> str:
 
 def _as_data(facts: Mapping[str, Any]) -> dict[str, Any]:
     """Select what goes into the JSON file: the facts, and every attribute of the calibration."""
-    left_out = ("found", "heat", "worst", "outlier_names", "wider", "moved", "arm")
+    left_out = ("found", "of_target", "heat", "worst", "outlier_names", "wider", "moved", "arm")
     kept = {name: value for name, value in facts.items() if name not in left_out}
     return kept | {"calibration": facts["found"]}
 
