@@ -34,7 +34,7 @@ from pkmcal.readings.lens_files import read_lens, write_lens
 from pkmcal.readings.measured import InFit, Measured
 from pkmcal.readings.pictures import Picture, pictures
 from pkmcal.readings.predicted import At, Lots, Predicted, Shared
-from pkmcal.readings.reading import Reading, Sets, Solve
+from pkmcal.readings.reading import HeldNumbers, Reading, Sets, Solve
 from pkmcal.readings.seen_places import tool_places
 from pkmcal.readings.sight import visible
 from pkmcal.readings.unknowns import PLACE, Dependence, Numbers, Start, always
@@ -133,6 +133,21 @@ class Camera(Reading):
     tells_actuators: ClassVar[bool] = True
     scaled_by: ClassVar[str] = "board"
     frame_order: ClassVar[int] = 5
+    held = (
+        HeldNumbers(
+            "another focal length or middle of the lens",
+            "--lens focal (lens='focal'), or calibrate the camera as it is",
+            "lens", (0, 1, 2, 3),
+        ),
+        HeldNumbers(
+            "another distortion of the lens",
+            "--lens all (lens='all'), or calibrate the camera as it is",
+            "lens", (4, 5, 6, 7),
+        ),
+        HeldNumbers(
+            "a board of another size", "measure it, or --find-size (find_size=True)", "size", (0,)
+        ),
+    )  # fmt: skip
     by_rows = ("lens", "size")
     own_points = ("corner",)
     truth = ("stands", "carried")
@@ -367,10 +382,23 @@ class Camera(Reading):
     def doubts(self, m: Measured) -> Iterator[str]:
         """Lenses of turned or rectified pictures, mirrored pictures."""
         used, number = self._pictures_told(m)
+        yield from self._outside(m)
         if not len(used) or self.lens != "none":
-            return iter(())
+            return
         corner, size = self._corners(len(m))[used], (self.width, self.height)
-        return lens_doubts(corner, m.values[used], self.lens_numbers(), number, size)
+        yield from lens_doubts(corner, m.values[used], self.lens_numbers(), number, size)
+
+    def _outside(self, m: Measured) -> Iterator[str]:
+        """Say that pixels are where pictures of this camera end."""
+        for name, word, end, seen in zip(
+            "uv", ("wide", "high"), (self.width, self.height), m.values.T, strict=True
+        ):
+            most, least = np.nanmax(seen, initial=0.0), np.nanmin(seen, initial=0.0)
+            if end and (most > end or least < -1.0):
+                yield (
+                    f"{name} reaches from {least:.0f} to {most:.0f} px, and pictures of this camera"
+                    f" are {end} px {word}: the lens is of pictures of another size, or turned"
+                )
 
     def _pictures_told(self, m: Measured) -> tuple[IntArray, IntArray]:
         """Rows (n,) of pictures that tell where a board is, and which picture each is of (n,)."""

@@ -63,6 +63,27 @@ class Family(NamedTuple):
         return {"mm": "lengths", "rad": "angles"}.get(self.unit, f"readings in {self.unit}")
 
 
+class HeldNumbers(NamedTuple):
+    """Numbers of an instrument that a calibration holds and that may be wrong.
+
+    Attributes
+    ----------
+    name : str
+        What is wrong then, as messages say it.
+    cure : str
+        What helps.
+    argument : str
+        The argument of `Reading.predict` that has them.
+    slots : tuple of int
+        Which of its numbers they are.
+    """
+
+    name: str
+    cure: str
+    argument: str
+    slots: tuple[int, ...]
+
+
 class Reading:
     """A kind of reading. A subclass is a frozen dataclass; its fields are the instrument's own.
 
@@ -106,6 +127,8 @@ class Reading:
         Whether poses can be planned for the object that its word stands for.
     starts_by_pose : bool
         Whether `starts` needs the poses of the nominal machine.
+    held : tuple of HeldNumbers
+        Numbers of the instrument that are held unless asked otherwise, and may be wrong.
     by_rows : tuple of str
         Arguments of `shared` that rows depend on by themselves, not through their lot's motion.
     per_row : tuple of str
@@ -141,6 +164,7 @@ class Reading:
     by_firmware: ClassVar[bool] = False
     planned: ClassVar[bool] = True
     starts_by_pose: ClassVar[bool] = False
+    held: ClassVar[tuple[HeldNumbers, ...]] = ()
     by_rows: ClassVar[tuple[str, ...]] = ()
     per_row: ClassVar[tuple[str, ...]] = ()
     labels: ClassVar[tuple[str, ...]] = ()

@@ -20,6 +20,7 @@ from pkmcal.readings.hand_eye import of_frame_and_tool
 
 _FEWEST = 4  # pictures, more of which tell that they are mirrored
 _OFF, _FALLS = 0.1, 3.0  # rad by which mirrored pictures are off, and how many times less mirrored
+_STRANGE = 0.05  # of the extent of a board in a picture, by which its corners are off at most
 _DRAWN = 5  # pictures of a draw
 _DRAWS = 60
 _ROUNDS = 10  # of choosing and laying in turn
@@ -83,11 +84,28 @@ def _agreed(
 ) -> tuple[FloatArray, bool]:
     """Return `tool_places`, and whether most pictures show the board from behind."""
     boards = board_poses(corner, pixel, lens, picture)
+    _require_the_board(pixel, picture, boards.rms[:, 0])
     seen = np.where(boards.possible[:, :, None], boards.pose, np.nan)
     behind = bool(np.median(facing(boards)) < 0.0)
     if rides:
         seen = twists.inverse(seen.reshape(-1, 6)).reshape(seen.shape)
     return in_agreement(seen, pose), behind
+
+
+def _require_the_board(pixel: FloatArray, picture: IntArray, off: FloatArray) -> None:
+    """Refuse pictures that do not show the board: most corners are far from where it has them."""
+    count = np.bincount(picture)
+    middle = np.stack([np.bincount(picture, each) for each in pixel.T], axis=1) / count[:, None]
+    away = np.linalg.norm(pixel - middle[picture], axis=1)
+    extent = 2.0 * np.sqrt(np.bincount(picture, away**2) / count)
+    share = np.where(np.isfinite(off), off, np.inf) / extent
+    if np.median(share) > _STRANGE:
+        typical = float(np.median(off[np.isfinite(off)])) if np.isfinite(off).any() else np.inf
+        raise ArgumentError(
+            f"measurements: corners of most pictures are not where the board has them"
+            f" ({typical:.3g} px off, of boards of {np.median(extent):.3g} px): state the board that"
+            " was printed, columns before rows, and the lens of these pictures"
+        )
 
 
 def in_agreement(seen: FloatArray, pose: FloatArray) -> FloatArray:
