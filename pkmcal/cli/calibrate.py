@@ -13,6 +13,7 @@ from pkmcal.cli.camera_options import BoardSize, BoardsSeen, CameraOn, Lenses, L
 from pkmcal.cli.measured import (
     Columns,
     Controller,
+    FromPnp,
     Ignore,
     InvertPoses,
     JoinBy,
@@ -221,6 +222,7 @@ def calibrate(
     units: Units = None,
     rotation: Rotation = None,
     invert_poses: InvertPoses = False,
+    from_pnp: FromPnp = None,
     probe_offset: ProbeOffset = None,
     camera: Lenses = None,
     camera_on: CameraOn = "base",

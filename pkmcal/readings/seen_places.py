@@ -53,23 +53,44 @@ def tool_places(
     Raises
     ------
     ValueError
-        The pictures are mirrored.
+        The pictures are mirrored, or do not belong to these poses.
     """
     if not len(pose):
         return np.empty((0, 6))
     places, behind = _agreed(corner, pixel, picture, lens, rides, pose)
-    if not behind or len(pose) <= _FEWEST:
+    off = disagreement(places, pose) if len(pose) > _FEWEST else 0.0
+    if off <= _OFF:
         return places
     mirrored = lens * np.where(np.arange(9) == 7, -1.0, 1.0)  # p2
     across = pixel * [-1, 1] + [2 * lens[2], 0]
-    other, _ = _agreed(corner, across, picture, mirrored, rides, pose)
-    off, otherwise = disagreement(places, pose), disagreement(other, pose)
-    if off > _OFF and otherwise * _FALLS < off:
+    if behind:
+        other, _ = _agreed(corner, across, picture, mirrored, rides, pose)
+        otherwise = disagreement(other, pose)
+        if otherwise * _FALLS < off:
+            raise ArgumentError(
+                f"measurements: the pictures are mirrored: where they show the board differs by"
+                f" {np.degrees(off):.2g} deg from how the machine moves, and by"
+                f" {np.degrees(otherwise):.2g} deg with left and right exchanged; take"
+                " pictures without mirroring, or state u as the width less 1 less u"
+            )
+    trials = {
+        "with the camera on the other of base and platform": _agreed(
+            corner, pixel, picture, lens, not rides, pose
+        )[0],
+    }
+    found = {how: disagreement(places, pose) for how, places in trials.items()}
+    for how, rows in (("next", 1), ("previous", -1)):
+        found[f"with the actuators of the {how} picture"] = disagreement(
+            places, np.roll(pose, -rows, axis=0)
+        )
+    how = min(found, key=lambda each: found[each])
+    fits = f", and by {np.degrees(found[how]):.2g} deg {how}"
+    if found[how] * _FALLS < off or off > _GROSS:
         raise ArgumentError(
-            f"measurements: the pictures are mirrored: where they show the board differs by"
-            f" {np.degrees(off):.2g} deg from how the machine moves, and by"
-            f" {np.degrees(otherwise):.2g} deg with left and right exchanged; take"
-            " pictures without mirroring, or state u as the width less 1 less u"
+            f"measurements: where pictures show the board differs by {np.degrees(off):.2g} deg from"
+            f" how the machine moves{fits if found[how] * _FALLS < off else ''}: pictures and"
+            " actuators have to belong together, row by row; check what the camera is on, and signs"
+            " and units of the actuators"
         )
     return places
 
