@@ -189,6 +189,31 @@ class Camera(Reading):
         size = self.width, self.height
         write_lens(path, self.lens_numbers(), size, self.motions, comment)
 
+    def drawn(self) -> dict[str, Any]:
+        """Tell a page where camera and board are, what the lens is and how large its pictures."""
+        stands, carried = self.motions.values()
+        places = [
+            {"R": motion[:3, :3].ravel().tolist(), "p": motion[:3, 3].tolist()}
+            for motion in (np.linalg.inv(stands), carried)
+        ]
+        corner = np.atleast_2d(np.asarray(self.corner, dtype=np.float64))
+        (left, top, low), (right, bottom, high) = corner.min(axis=0), corner.max(axis=0)
+        depth = 0.5 * float(low + high)
+        width, height = self.width or 2.0 * self.cx + 1.0, self.height or 2.0 * self.cy + 1.0
+        camera, board = places if self.on == "base" else places[::-1]
+        return {
+            "name": self.camera_name or "camera",
+            "rides": self.on == "platform",
+            "camera": camera,
+            "board": board,
+            "corners": [
+                [float(x), float(y), depth]
+                for x, y in ((left, top), (right, top), (right, bottom), (left, bottom))
+            ],
+            "lens": self.lens_numbers().tolist(),
+            "size": [float(width), float(height)],
+        }
+
     @property
     def motions(self) -> Mapping[str, FloatArray]:
         """Motions (4, 4), mm, of a camera whose place is known, by what they take to what.

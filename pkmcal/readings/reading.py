@@ -251,6 +251,10 @@ class Reading:
         """The name of the file of an instrument as it was found; "" of those that have none."""
         return ""
 
+    def drawn(self) -> dict[str, Any] | None:
+        """Tell a page where an instrument as it was found stands and what it sees, or None."""
+        return None
+
     @property
     def motions(self) -> Mapping[str, FloatArray]:
         """Motions (4, 4) of an instrument as it was found, by what they take to what; mm."""
