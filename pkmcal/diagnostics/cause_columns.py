@@ -15,7 +15,7 @@ from pkmcal.effects.gears import Coupling, Harmonics
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.exceptions import ArgumentError
 from pkmcal.fitted.fit import Fit
-from pkmcal.fitted.held_numbers import held_numbers
+from pkmcal.fitted.held_numbers import bound_names, bound_numbers
 from pkmcal.fitted.left_out import effect_columns
 from pkmcal.geometry.stated_uncertainty import SCALE, StatedUncertainty
 from pkmcal.kinematics.calibratable import Calibratable, as_arm
@@ -156,12 +156,12 @@ def _sag(fit: Fit) -> Columns | None:
 
 
 def _numbers(stated: StatedUncertainty) -> Callable[[Fit], Columns | None]:
-    """Columns of numbers that the fit held."""
+    """Columns of numbers that measurements could not move."""
 
     def columns(fit: Fit) -> Columns | None:
         if SCALE in stated.own and fit.uncertainty.mixed:
             return None  # effects need poses that follow from the actuators
-        held = held_numbers(fit.uncertainty, _at(fit), stated)
+        held = bound_numbers(fit.uncertainty, _at(fit), stated)
         return None if held is None else held.columns
 
     return columns
@@ -176,9 +176,11 @@ def _gains(fit: Fit) -> Columns | None:
 
 def _lean(fit: Fit) -> Columns | None:
     """All targets sit elsewhere by the same: on the platform, where they are known."""
+    bound = bound_names(fit.uncertainty, _at(fit))
     known = [
         any(
-            each.role == each.argument == "target" and not each.estimated
+            each.role == each.argument == "target"
+            and all(name in bound for own in each.estimated.values() for name in own.names)
             for each in data.dependences()
         )
         for data in fit.equations.prediction.datasets

@@ -65,10 +65,10 @@ def _explained(
 ) -> tuple[FoundCause, ...]:
     """Test causes, the one that explains most first."""
     sure = found.fit.uncertainty
-    if sure.rounded or not usable(found.fit.estimate.evaluation) or sure.fit.freedom < _FEW:
+    if sure.rounded or not usable(found.fit.estimate.evaluation) or sure.tested.freedom < _FEW:
         return ()
     pairs = list(possible(found.fit))
-    every = causes(sure.fit, [columns for _, columns in pairs], CHANCE, _MOST)
+    every = causes(sure.tested, [columns for _, columns in pairs], CHANCE, _MOST)
     return tuple(
         FoundCause(
             pairs[each.cause][0].name,

@@ -107,7 +107,7 @@ def _lacking(found: Solution) -> tuple[LackingSag, ...]:
         return ()
     machine = found.fit.parameters.robot
     columns = effect_columns(found.fit, [helps.effect.of_machine(machine)])
-    seen = [] if columns is None else causes(found.fit.uncertainty.fit, [columns], SURE, 1)
+    seen = [] if columns is None else causes(found.fit.uncertainty.tested, [columns], SURE, 1)
     shift = seen[0].shift if seen else 0.0
     return (LackingSag(*helps, shift, None if columns is None else _alike(found.fit, columns)),)
 
@@ -119,7 +119,9 @@ def _alike(fit: Fit, sag: Columns) -> Harmonics | None:
         (each, effect_columns(fit, [each.of_machine(machine)])) for each in waves_a_turn(machine)
     ]
     there = [(each, columns) for each, columns in by_wave if columns is not None]
-    (best, *_) = causes(fit.uncertainty.fit, [sag, *(own for _, own in there)], SURE, 1) or (None,)
+    (best, *_) = causes(fit.uncertainty.tested, [sag, *(own for _, own in there)], SURE, 1) or (
+        None,
+    )
     if best is None or best.cause == 0 or 0 not in best.also:
         return None
     return there[best.cause - 1][0]

@@ -26,11 +26,13 @@ from pkmcal.estimation.parameters import Asked, Bounds, Parameters
 from pkmcal.estimation.prior_functions import is_function, prior_functions
 from pkmcal.estimation.scales import unit_scales
 from pkmcal.estimation.sessions import Scope, label, matches, scopes
-from pkmcal.estimation.uncertain_numbers import spread, uncertain_names
+from pkmcal.estimation.uncertain_numbers import own_deviations, spread, uncertain_names
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.geometry.elastic import is_kinematic
 from pkmcal.geometry.stated_uncertainty import LEAST, MOST
 from pkmcal.kinematics.calibratable import Calibratable
+
+_EXACT = 1e-7  # mm that a number moves the machine by: what is stated to be less is exact as well
 
 
 def parameters(
@@ -77,12 +79,6 @@ def parameters(
     number_of = np.array([number for number, _ in entries], dtype=np.intp)
     names = tuple(numbers[j] + (f"@{behind}" if behind else "") for j, behind in entries)
     uncertain = np.isin(number_of, sorted(fitted_along))
-    of_uncertain = spread(
-        asked.uncertainty, [n for n, own in zip(names, uncertain, strict=True) if own]
-    )
-    along_entries = [entry for entry, own in zip(entries, uncertain, strict=True) if own]
-    for point, block in blocks.items():
-        _add_known(of_uncertain, along_entries, block, beside[point].spread)
     units_of = geometry.units
     every = [units_of[i] for i in places.tolist()]
     every += [unit for each in beside.values() for unit in each.units]
@@ -97,6 +93,13 @@ def parameters(
     ]
     of_unit = unit_scales(robot, [data.measured for data in datasets])
     scale = _scales(np.concatenate(of_number)[number_of], of_unit, names, units, like)
+    along = [n for n, own in zip(names, uncertain, strict=True) if own]
+    least = _EXACT * scale[uncertain]
+    small = own_deviations(asked.uncertainty, along) < least
+    of_uncertain = spread(asked.uncertainty, along) + np.diag(np.where(small, least, 0.0) ** 2)
+    along_entries = [entry for entry, own in zip(entries, uncertain, strict=True) if own]
+    for point, block in blocks.items():
+        _add_known(of_uncertain, along_entries, block, beside[point].spread)
     starts = [geometry.values[places], *(each.start for each in beside.values())]
     values = np.concatenate(starts)[number_of]
     count = int(np.count_nonzero(number_of < len(places)))
