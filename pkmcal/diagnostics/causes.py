@@ -82,6 +82,6 @@ CHECKS = (
     Check(
         name="causes", about="a cause that is not in the model would explain residuals",
         levels=("doubt", "remark"), level_of=_level, run=found_causes, say=_text,
-        unless=("grave", "sag-lacking"),
+        unless=("grave", "sag-lacking", "follows-loads"),
     ),
 )  # fmt: skip

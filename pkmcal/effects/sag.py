@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -54,7 +54,11 @@ class Sag:
     joints: Joints = "main"
     tied: bool = False
     turns: float = TURNS
-    name: ClassVar[str] = "sag"
+
+    @property
+    def name(self) -> str:
+        """As messages say it; products and compliances may be found together."""
+        return "tied sag" if self.tied else "sag"
 
     def __repr__(self) -> str:
         stated = [] if self.joints == "main" else [repr(self.joints)]
@@ -89,7 +93,7 @@ class Sag:
         products = _products(arm)
         joints = self._chosen(arm, products)
         if self.tied:
-            return _tied(arm, joints, turns)
+            return Changed(self.name, *_tied(arm, joints, turns))
         terms = _independent(products, joints)
         own = dict.fromkeys((term.name for term in terms), turns)
         return Changed(self.name, ArmMachine(arm.with_terms(terms)), own)
@@ -171,8 +175,10 @@ def _independent(products: FloatArray, joints: Sequence[int]) -> list[Term]:
     return found
 
 
-def _tied(arm: SerialArm, joints: Sequence[int], turns: float) -> Changed:
-    """The arm with a compliance of each of these joints."""
+def _tied(
+    arm: SerialArm, joints: Sequence[int], turns: float
+) -> tuple[ArmMachine, dict[str, float]]:
+    """The arm with a compliance of each of these joints, and the deviations of their priors."""
     arm = arm.weighed()
     pulls = arm.joint_laws.pulls
     assert pulls.masses is not None and pulls.centres is not None
@@ -190,6 +196,4 @@ def _tied(arm: SerialArm, joints: Sequence[int], turns: float) -> Changed:
         if not size[i] > 0.0:
             raise ArgumentError(f"sag: the links behind joint {i + 1} weigh nothing")
         own[Term(i, "compliance")] = turns / float(size[i])
-    return Changed(
-        "sag", ArmMachine(arm.with_terms(own)), {term.name: each for term, each in own.items()}
-    )
+    return ArmMachine(arm.with_terms(own)), {term.name: each for term, each in own.items()}

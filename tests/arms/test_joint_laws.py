@@ -272,3 +272,11 @@ centre = [300, 0, 0]
         (tmp_path / "wrong.toml").write_text(one + wrong)
         with pytest.raises(pk.FileError, match=message):
             pk.load(tmp_path / "wrong.toml")
+
+
+@pytest.mark.parametrize("call", ["forward", "jacobian", "inverse"])
+def test_loads_are_as_many_as_rows(call: str) -> None:
+    arm, theta = loaded(rows=4), np.full((3, 6), 0.3)
+    asked = SIX.forward(theta) if call == "inverse" else theta
+    with pytest.raises(ValueError, match="load is of 4 rows, but 3 were asked for"):
+        getattr(arm, call)(asked)

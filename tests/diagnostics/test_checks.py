@@ -173,3 +173,9 @@ def test_a_remedy_without_a_value_is_not_applied() -> None:
     for before in ({}, {"fix": "offset1"}):
         with pytest.raises(pk.ArgumentError, match=r"^fix: the remedy states no value"):
             pk.Remedy("fix").applied(before)
+
+
+def test_a_level_that_no_check_has_is_an_error(found: Identification) -> None:
+    strange = check("a", levels=("doubt", "remark"), level_of=lambda found, seen: "sure")
+    with pytest.raises(ValueError, match="a: level_of must say doubt, remark or None; said 'sure'"):
+        pk.diagnose(found, [strange])
