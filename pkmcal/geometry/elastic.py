@@ -9,10 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from pkmcal.arrays import Unit
+from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.load import is_of_load
 
 GRAVITY = (0.0, 0.0, -9.80665)  # m/s², in the axes of the base
 COMPLIANCE, PER_LENGTH = "compliance.", ".per_length"
+SOFTEST = 100.0  # mm/N, rad/(N mm): 1 kg moves the number by 1 m
 _GROUPS = ("compliance", "mass.", "centre.", "payload.", "gravity.", "balancer")
 
 
@@ -98,6 +100,27 @@ class Elastic:
 
 def _point(name: str, unit: Unit) -> dict[str, Unit]:
     return {f"{name}.{axis}": unit for axis in "xyz"}
+
+
+def require_compliance(what: str, value: float, stiffness: str, per_stiffness: float = 1.0) -> None:
+    """Refuse a compliance that no machine has, such as a stiffness in its place.
+
+    Parameters
+    ----------
+    what : str
+        As messages say it.
+    value : float
+        The compliance, mm/N or rad/(N mm).
+    stiffness : str
+        The unit of the stiffness that it may be.
+    per_stiffness : float
+        The compliance of a stiffness of 1.
+    """
+    if value > SOFTEST:
+        raise ArgumentError(
+            f"{what} is {value:g}, softer than any machine: if that is a stiffness in {stiffness},"
+            f" its compliance is {per_stiffness / value:.4g}"
+        )
 
 
 def is_kinematic(name: str) -> bool:

@@ -12,7 +12,7 @@ from pkmcal.arrays import FloatArray, Unit
 from pkmcal.core.library import SLOTS
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.carried import CARRIED, Load
-from pkmcal.geometry.elastic import COMPLIANCE, Elastic, Spring, is_elastic
+from pkmcal.geometry.elastic import COMPLIANCE, Elastic, Spring, is_elastic, require_compliance
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.model import Model
 from pkmcal.geometry.ties import LimbNumber, Tie
@@ -59,8 +59,10 @@ def yielding(
     """
     wanted: dict[str, float] = {}
     for pattern, value in compliance.items():
-        number(f"compliance of {pattern}", value, least=0.0)
+        what = f"compliance of {pattern}"
+        number(what, value, least=0.0)
         wanted |= dict.fromkeys(elastic_numbers(model, pattern), float(value))
+        require_compliance(what, value, "N/mm or N mm/rad")
     if ways is not None:
         return _with_springs(model, wanted, ways)
     known = {name: value for name, value in wanted.items() if COMPLIANCE + name in model.geometry}

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 import pkmcal as pk
+from pkmcal.arms.joint_laws import Term
 from tests.robots import hexapod
 
 from ..arms.test_joint_laws import CENTRES, MASSES, SIX
@@ -30,7 +32,8 @@ def test_compliances_of_an_arm_in_another_unit_are_found(
     compliance: float, what: str | None
 ) -> None:
     """Also where no posture holds: the sag of such an arm is no number."""
-    weighed = SIX.with_laws(SIX.joint_laws.weighing(MASSES, CENTRES))
-    findings = pk.check_geometry(weighed.yielding({2: compliance})).findings
+    laws = SIX.joint_laws.weighing(MASSES, CENTRES).with_terms([Term(1, "compliance")])
+    arm = SIX.with_laws(laws.with_values(np.array([compliance])))
+    findings = pk.check_geometry(arm).findings
     assert len(findings) == (what is not None)
     assert all(each.kind == "load" and str(what) in each.what for each in findings)
