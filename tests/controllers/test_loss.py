@@ -1,4 +1,4 @@
-"""How far an export is from the machine: of the poses that both have, and how many they have not."""
+"""How far an export is from the machine, at the poses that both have, and how many lack."""
 
 from __future__ import annotations
 
