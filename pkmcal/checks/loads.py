@@ -58,7 +58,8 @@ def _several_springs(robot: Robot) -> Iterator[Finding]:
         yield Finding(
             "load",
             limbs,
-            f"{named(i - 1 for i in limbs)} share actuator {actuator + 1}, and the drive of each yields by itself",
+            f"{named(i - 1 for i in limbs)} share actuator {actuator + 1}, and the drive of each"
+            " yields by itself",
             "one screw or crank under all of them is a parameter: screw = 0.0 under [parameters],"
             ' offset = "screw" in each limb, and screw = 5e-5 under [compliance]',
         )
