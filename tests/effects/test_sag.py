@@ -7,6 +7,7 @@ and the springs agree (`weights.at_rest`), which the products do not know.
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -351,6 +352,29 @@ def test_gears_are_found_with_their_waves() -> None:
     for name, value in zip(names, numbers, strict=True):
         own = found.parameters[name]
         assert abs(own["value"] - value) < 4 * own["stderr"] < abs(value)
+
+
+def test_linked_axes_of_a_palletiser_are_found_and_undone(tmp_path: Path) -> None:
+    """Parallelogram: the forearm keeps its angle as the upper arm turns, by a ratio a little off."""
+    ARM.save(tmp_path / "arm.toml")
+    head, *joints = (tmp_path / "arm.toml").read_text(encoding="utf-8").split("[[joint]]\n")
+    joints[2] = "drive = { coupled = [{ joint = 2, by = -1.0 }] }\n" + joints[2]
+    (tmp_path / "linked.toml").write_text("[[joint]]\n".join([head, *joints]), encoding="utf-8")
+    linked = pk.load(tmp_path / "linked.toml")
+    assert linked.joint_laws.names == ("coupling3.2",)
+    ratio = -1.0003
+    true = linked.replace(built(15).joint_errors)
+    true = true.with_laws(true.laws.with_values(np.array([ratio])))
+    theta = commands(80, 100)
+    m = pk.VirtualMachine(true, NOISE, seed=101).measure(theta, "position", TARGETS[0])
+    found = pk.identify(linked, m, effects=[pk.Coupling([(3, 2)])])
+    own = found.parameters["coupling3.2"]
+    assert abs(own["value"] - ratio) < 4 * own["stderr"] < 1e-4
+    assert pk.identify(linked, m).rms > 3.0 * found.rms
+    tool = found.robot.forward(theta)
+    again = found.robot.inverse(tool, guess=theta + 1e-2)
+    assert again.ok.all()
+    np.testing.assert_allclose(found.robot.forward(again.theta), tool, atol=1e-9)
 
 
 def test_backlash_is_found_from_where_joints_came() -> None:
