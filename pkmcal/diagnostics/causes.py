@@ -99,7 +99,7 @@ CHECKS = (
     Check(
         name="causes", about="a cause that is not in the model would explain residuals",
         levels=("doubt", "remark"), level_of=_level, run=found_causes, say=_text,
-        unless=("grave", "sag-lacking"),
+        unless=("grave", "sag-lacking", "follows-loads"),
     ),
     Check(
         name="instrument", about="a lens or a board that is not as stated would explain a bad fit",
