@@ -68,10 +68,14 @@ def parameters(
     scope = scopes(numbers, blocks, asked.per_session, asked.by_set)
     entries = _entries(len(places), scope, blocks, datasets, asked.held_points)
     fitted_along = {*range(len(free), len(places))}
-    for (role, _), block in blocks.items():
-        if role in asked.uncertain_roles:
+    beside_known = set[int]()
+    for point, block in blocks.items():
+        if point[0] in asked.uncertain_roles:
             fitted_along |= {*range(block.start, block.stop)}
-    entries = _without_exact(entries, numbers, fitted_along, asked)
+        if beside[point].spread is not None:
+            beside_known |= {*range(block.start, block.stop)}
+    entries = _without_exact(entries, numbers, fitted_along - beside_known, asked)
+    fitted_along |= beside_known
     number_of = np.array([number for number, _ in entries], dtype=np.intp)
     names = tuple(numbers[j] + (f"@{behind}" if behind else "") for j, behind in entries)
     uncertain = np.isin(number_of, sorted(fitted_along))
@@ -93,6 +97,9 @@ def parameters(
     least = _EXACT * scale[uncertain]
     small = own_deviations(asked.uncertainty, along) < least
     of_uncertain = spread(asked.uncertainty, along) + np.diag(np.where(small, least, 0.0) ** 2)
+    along_entries = [entry for entry, own in zip(entries, uncertain, strict=True) if own]
+    for point, block in blocks.items():
+        _add_known(of_uncertain, along_entries, block, beside[point].spread)
     starts = [geometry.values[places], *(each.start for each in beside.values())]
     values = np.concatenate(starts)[number_of]
     count = int(np.count_nonzero(number_of < len(places)))
@@ -130,6 +137,24 @@ def parameters(
     columns = {session: made.geometry_of(session) for session in made.sessions or ("",)}
     given = (asked.prior, robot, start, places, columns)
     return replace(made, functions=prior_functions(*given, strict=like is None))
+
+
+def _add_known(
+    spread: FloatArray,
+    entries: Sequence[tuple[int, str]],
+    block: slice,
+    known: FloatArray | None,
+) -> None:
+    """Add what a reading itself knows of numbers to the covariance of uncertain ones (u, u)."""
+    if known is None:
+        return
+    for behind in dict.fromkeys(behind for _, behind in entries):
+        mine = [
+            i for i, (j, own) in enumerate(entries)
+            if own == behind and block.start <= j < block.stop
+        ]  # fmt: skip
+        slots = [entries[i][0] - block.start for i in mine]
+        spread[np.ix_(mine, mine)] += known[np.ix_(slots, slots)]
 
 
 def _refuse_twice(names: Sequence[str]) -> None:

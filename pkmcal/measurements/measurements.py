@@ -32,7 +32,7 @@ from pkmcal.measurements.field import (
 from pkmcal.measurements.former import OF_MEASUREMENTS, adapted
 from pkmcal.measurements.listing import table, title
 from pkmcal.measurements.measurement_writer import write_measurements
-from pkmcal.measurements.numbering import Group, Lines
+from pkmcal.measurements.numbering import Group, Lines, PoseName
 from pkmcal.measurements.poses import pose_index
 from pkmcal.measurements.session import Session
 from pkmcal.measurements.sigma import Sigma
@@ -106,6 +106,8 @@ class Measurements(Result):
     group : (N,) array of int, optional
         Rows with the same number are repeats of one pose, as rows with the same actuator readings
         are.
+    pose_name : (N,) sequence of str, optional
+        Names of these poses, such as those of pictures: messages call them by these.
     actuator_sigma : scalar, (n,) or (N, n) array, optional
         Standard deviation of what the actuators read, mm or rad. None: they are where they read on
         a machine with as many closures as free coordinates; on one with more, and with rows that
@@ -169,6 +171,7 @@ class Measurements(Result):
     sigma: FloatArray | None = declared(Sigma())
     target_index: Int64Array | None = declared(TargetIndex())
     group: Int64Array | None = declared(Group())
+    pose_name: TextArray | None = declared(PoseName())
     session: TextArray | None = declared(Session())
     temperature: FloatArray | None = declared(Temperature())
     time: FloatArray | None = declared(Time())
