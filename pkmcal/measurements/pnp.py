@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from pkmcal.arguments import instance, number, word
 from pkmcal.arrays import FloatArray
@@ -40,8 +39,8 @@ def from_pnp(
     Parameters
     ----------
     measurements : Measurements
-        Of kind "pose": the board in axes of the camera (z forward, x right, y down), as ``solvePnP``
-        and the like find it.
+        Of kind "pose": the board in axes of the camera (z forward, x right, y down), as
+        ``solvePnP`` and the like find it.
     focal : float
         Focal length of the camera, px.
     board : Board, or (width, height)

@@ -415,14 +415,14 @@ class Camera(Reading):
 
     def _outside(self, m: Measured) -> Iterator[str]:
         """Say that pixels are where pictures of this camera end."""
-        for name, word, end, seen in zip(
+        for name, way, end, seen in zip(
             "uv", ("wide", "high"), (self.width, self.height), m.values.T, strict=True
         ):
             most, least = np.nanmax(seen, initial=0.0), np.nanmin(seen, initial=0.0)
             if end and (most > end or least < -1.0):
                 yield (
                     f"{name} reaches from {least:.0f} to {most:.0f} px, and pictures of this camera"
-                    f" are {end} px {word}: the lens is of pictures of another size, or turned"
+                    f" are {end} px {way}: the lens is of pictures of another size, or turned"
                 )
 
     def _pictures_told(self, m: Measured) -> tuple[IntArray, IntArray]:
@@ -439,7 +439,9 @@ class Camera(Reading):
         at = At(solve(m.actuators, "q").pose, frame=stands)
         seen = self.predict(at, **self.arguments(m)).values
         size = (self.width, self.height)
-        seen[~visible(self._boards(at.pose), self._corners(len(m)), seen, self.lens_numbers(), size)] = np.nan
+        seen[
+            ~visible(self._boards(at.pose), self._corners(len(m)), seen, self.lens_numbers(), size)
+        ] = np.nan
         return seen
 
     # units ----------------------------------------------------------------------------------------
@@ -499,9 +501,7 @@ class Camera(Reading):
         """The nine numbers (9,), in the order of `LENS`."""
         return np.array([getattr(self, name) for name in LENS], dtype=np.float64)
 
-    def _lens_found(
-        self, m: Measured, slots: Sequence[int], known: FloatArray | None
-    ) -> Numbers:
+    def _lens_found(self, m: Measured, slots: Sequence[int], known: FloatArray | None) -> Numbers:
         """Numbers of the lens that are found, or fitted along as they are known (9, 9)."""
         mm, stem = float(self.mm(m, 1000.0)[0]), _dotted("lens", self.camera_name)
         return numbers_of_lens(stem, self.lens_numbers(), tuple(slots), m.values, mm, known)

@@ -86,7 +86,9 @@ def read_lens(path: str | PathLike[str]) -> dict[str, Any]:
             f"{file}: {len(bent)} distortion coefficients (rational, thin prism or tilted): only k1"
             " k2 p1 p2 k3 are supported; calibrate with these, or rectify the images"
         )
-    lens: dict[str, Any] = dict(zip(("fx", "cx", "fy", "cy"), (matrix[i] for i in (0, 2, 4, 5)), strict=True))
+    lens: dict[str, Any] = dict(
+        zip(("fx", "cx", "fy", "cy"), (matrix[i] for i in (0, 2, 4, 5)), strict=True)
+    )
     lens |= dict(zip(_NAMES, bent, strict=False))
     for name, words in _SIZE.items():
         size = _numbers(_first(known, words))

@@ -339,7 +339,9 @@ def over_the_workspace(
     if places.area is None:
         return sampled, None
     area = places.area
-    return sampled, Slice(area.axes, area.values, area.filled(expected(found, area.poses, places.poses)))
+    return sampled, Slice(
+        area.axes, area.values, area.filled(expected(found, area.poses, places.poses))
+    )
 
 
 def over_the_measured(found: Identification) -> FloatArray:
