@@ -15,10 +15,10 @@ from pkmcal.effects.gears import Coupling, Harmonics
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.exceptions import ArgumentError
 from pkmcal.fitted.fit import Fit
-from pkmcal.fitted.held_numbers import held_numbers
+from pkmcal.fitted.held_numbers import bound_names, bound_numbers
 from pkmcal.fitted.left_out import effect_columns
 from pkmcal.geometry.stated_uncertainty import SCALE, StatedUncertainty
-from pkmcal.kinematics.calibratable import ArmMachine, Calibratable
+from pkmcal.kinematics.calibratable import Calibratable, as_arm
 from pkmcal.readings.predicted import Predicted
 from pkmcal.readings.reading import HeldNumbers
 from pkmcal.statistics.score_test import Columns
@@ -144,7 +144,7 @@ def _sag(fit: Fit) -> Columns | None:
     Arms yield to the weight of their links: a check of its own tests that at poses left out. Of
     surplus actuators forces do not follow from the weight alone.
     """
-    if isinstance(fit.parameters.robot, ArmMachine) or fit.uncertainty.mixed:
+    if fit.parameters.robot.kind == "arm" or fit.uncertainty.mixed:
         return None
     end = _at(fit)
 
@@ -156,12 +156,12 @@ def _sag(fit: Fit) -> Columns | None:
 
 
 def _numbers(stated: StatedUncertainty) -> Callable[[Fit], Columns | None]:
-    """Columns of numbers that the fit held."""
+    """Columns of numbers that measurements could not move."""
 
     def columns(fit: Fit) -> Columns | None:
         if SCALE in stated.own and fit.uncertainty.mixed:
             return None  # effects need poses that follow from the actuators
-        held = held_numbers(fit.uncertainty, _at(fit), stated)
+        held = bound_numbers(fit.uncertainty, _at(fit), stated)
         return None if held is None else held.columns
 
     return columns
@@ -176,9 +176,11 @@ def _gains(fit: Fit) -> Columns | None:
 
 def _lean(fit: Fit) -> Columns | None:
     """All targets sit elsewhere by the same: on the platform, where they are known."""
+    bound = bound_names(fit.uncertainty, _at(fit))
     known = [
         any(
-            each.role == each.argument == "target" and not each.estimated
+            each.role == each.argument == "target"
+            and all(name in bound for own in each.estimated.values() for name in own.names)
             for each in data.dependences()
         )
         for data in fit.equations.prediction.datasets
@@ -222,7 +224,8 @@ def _of_arm(fit: Fit) -> Iterator[Cause]:
 
 def waves_a_turn(machine: Calibratable) -> list[Harmonics]:
     """A wave a turn of each joint of an arm that turns; none of another machine."""
-    kinds = machine.arm.kinds if isinstance(machine, ArmMachine) else ()
+    arm = as_arm(machine)
+    kinds = () if arm is None else arm.kinds
     return [Harmonics(1, joints=i) for i, kind in enumerate(kinds, 1) if kind == "revolute"]
 
 

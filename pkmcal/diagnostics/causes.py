@@ -65,10 +65,10 @@ def _explained(
 ) -> tuple[FoundCause, ...]:
     """Test causes, the one that explains most first."""
     sure = found.fit.uncertainty
-    if sure.rounded or not usable(found.fit.estimate.evaluation) or sure.fit.freedom < _FEW:
+    if sure.rounded or not usable(found.fit.estimate.evaluation) or sure.tested.freedom < _FEW:
         return ()
     pairs = list(possible(found.fit))
-    every = causes(sure.fit, [columns for _, columns in pairs], CHANCE, _MOST)
+    every = causes(sure.tested, [columns for _, columns in pairs], CHANCE, _MOST)
     return tuple(
         FoundCause(
             pairs[each.cause][0].name,
@@ -99,7 +99,7 @@ CHECKS = (
     Check(
         name="causes", about="a cause that is not in the model would explain residuals",
         levels=("doubt", "remark"), level_of=_level, run=found_causes, say=_text,
-        unless=("grave", "sag-lacking"),
+        unless=("grave", "sag-lacking", "follows-loads"),
     ),
     Check(
         name="instrument", about="a lens or a board that is not as stated would explain a bad fit",

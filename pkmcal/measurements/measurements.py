@@ -17,8 +17,10 @@ from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.understood import Understood
 from pkmcal.kinematics.drive_state import DriveState
+from pkmcal.kinematics.reading_units import Actuated
 from pkmcal.measurements.actuator_sigma import ActuatorSigma
 from pkmcal.measurements.approach import Approach
+from pkmcal.measurements.beside import Beside
 from pkmcal.measurements.carried_load import CarriedLoad
 from pkmcal.measurements.field import (
     declared,
@@ -134,6 +136,9 @@ class Measurements(Result):
         (N, 2 + n).
     time : (N,) array, optional
         When each row was measured, in seconds from any start: for the test of drift.
+    beside : mapping of str to (N,) array, optional
+        Other numbers of the rows by name, for readings and effects of your own; NaN: not read.
+        Kept as a structured array (N,): ``beside["current"]``.
     lines : (N,) array of int, optional
         The line of each row in the file it was read from, to name it by.
 
@@ -174,6 +179,7 @@ class Measurements(Result):
     tension: FloatArray | None = declared(Tension())
     tension_sigma: FloatArray | None = declared(TensionSigma())
     load: FloatArray | None = declared(CarriedLoad())
+    beside: Any = declared(Beside())
     lines: Int64Array | None = declared(Lines())
 
     # The types above are those of the attributes; anything array-like is taken.
@@ -201,9 +207,7 @@ class Measurements(Result):
         instrument = adapted(
             "Measurements", stated(kind, instrument), fields, OF_MEASUREMENTS, present
         )
-        require_other_columns(
-            type(instrument).__name__, instrument.components, instrument.labels, of_rows
-        )
+        require_other_columns(type(instrument), of_rows)
         q = numbers("actuators", actuators)
         if q.ndim not in (1, 2) or 0 in q.shape:
             raise ArgumentError(
@@ -369,7 +373,9 @@ class Measurements(Result):
         held = np.isin(pose, drawn)
         return self.select(~held), self.select(held)
 
-    def write(self, path: str | PathLike[str], comment: str = "") -> None:
+    def write(
+        self, path: str | PathLike[str], comment: str = "", *, robot: Actuated | None = None
+    ) -> None:
         """Write a CSV file that `read_measurements` reads back to the last bit, or nothing.
 
         Parameters
@@ -378,13 +384,27 @@ class Measurements(Result):
             The file; replaced as a whole or not at all.
         comment : str, optional
             Lines for its head, each with its ``#``.
+        robot : Robot or SerialArm, optional
+            The machine that was measured: its actuators' units are those of measurements that
+            state no `actuator_units`. Without it, these are written as mm.
 
         Raises
         ------
         OSError
             The file cannot be written; one that was there before is untouched.
+        ValueError
+            The machine has other actuators.
         """
-        write_measurements(self, path, comment)
+        if robot is None or self.actuator_units is not None:
+            write_measurements(self, path, comment)
+            return
+        if len(robot.actuator_units) != self.actuators.shape[1]:
+            raise ArgumentError(
+                f"robot has {len(robot.actuator_units)} actuators, the measurements have"
+                f" {self.actuators.shape[1]}"
+            )
+        known = dataclasses.replace(self, actuator_units=robot.actuator_units)
+        write_measurements(known, path, comment)
 
     @staticmethod
     def from_pandas(frame: Any, robot: Any = None, **options: Any) -> Measurements:

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pkmcal import display
-from pkmcal.arms.arm import SerialArm
 from pkmcal.calibration.identification import Identification
 from pkmcal.calibration.summary import WIDER
 from pkmcal.display import printable
@@ -125,7 +124,7 @@ def gather(
         "inputs": checksums(files),
         "instrument_sought": contents.instrument_identified(found),
         "of_target": contents.reads_lengths(found),
-        "arm": isinstance(found.robot, SerialArm),
+        "arm": found.fit.parameters.robot.kind == "arm",
         "export": contents.export_command(found),
         "version": version(),
     }
