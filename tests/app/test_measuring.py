@@ -92,7 +92,7 @@ def test_a_person_connects_starts_reads_and_calibrates(tmp_path: Path) -> None:
             form = page.locator("details form")
             form.get_by_label("address of the machine").wait_for()
             assert form.get_by_label("address of the machine").is_disabled()  # a person has none
-            form.get_by_label("machine", exact=True).select_option("reprap")
+            form.get_by_role("combobox", name="machine", exact=True).select_option("reprap")
             typed = form.get_by_label("address of the machine")
             assert typed.input_value() == ""
             typed.fill(address)
@@ -141,30 +141,33 @@ def test_a_person_connects_starts_reads_and_calibrates(tmp_path: Path) -> None:
 
 def test_stop_is_at_hand_on_every_screen_and_stops_the_machine(tmp_path: Path) -> None:
     folder = project(tmp_path / "project")
-    with duet() as (address, machine), browser.served(folder) as served:
-        with browser.page_of(served) as page:
-            page.get_by_role("button", name="3 Measure").click()
-            page.get_by_text("Measure with a machine now").click()
-            form = page.locator("details form")
-            form.get_by_label("machine", exact=True).select_option("reprap")
-            form.get_by_label("address of the machine").fill(address)
-            form.get_by_label("within, such as z=0:300").fill("z=5:40")
-            form.get_by_label("or poses").fill("4")
-            form.get_by_role("button", name="Connect").click()
-            panel = page.locator("#measuring")
-            panel.get_by_role("button", name="Start").click()
-            box = panel.get_by_role("textbox")
-            box.wait_for()
-            machine.long = True  # the next move does not end
-            box.fill("20.0")
-            box.press("Enter")
-            until(lambda: len(machine.lines) == 2)
-            page.get_by_role("button", name="2 Plan").click()
-            panel.get_by_role("button", name="Stop").click()
-            panel.get_by_text("stopped with 1 row in measured.csv").wait_for()
-            assert machine.lines[-1] == "M112" and len(machine.lines) == 3
-            panel.get_by_role("button", name="Close").click()
-            assert panel.count() == 0
+    with (
+        duet() as (address, machine),
+        browser.served(folder) as served,
+        browser.page_of(served) as page,
+    ):
+        page.get_by_role("button", name="3 Measure").click()
+        page.get_by_text("Measure with a machine now").click()
+        form = page.locator("details form")
+        form.get_by_role("combobox", name="machine", exact=True).select_option("reprap")
+        form.get_by_label("address of the machine").fill(address)
+        form.get_by_label("within, such as z=0:300").fill("z=5:40")
+        form.get_by_label("or poses").fill("4")
+        form.get_by_role("button", name="Connect").click()
+        panel = page.locator("#measuring")
+        panel.get_by_role("button", name="Start").click()
+        box = panel.get_by_role("textbox")
+        box.wait_for()
+        machine.long = True  # the next move does not end
+        box.fill("20.0")
+        box.press("Enter")
+        until(lambda: len(machine.lines) == 2)
+        page.get_by_role("button", name="2 Plan").click()
+        panel.get_by_role("button", name="Stop").click()
+        panel.get_by_text("stopped with 1 row in measured.csv").wait_for()
+        assert machine.lines[-1] == "M112" and len(machine.lines) == 3
+        panel.get_by_role("button", name="Close").click()
+        assert panel.count() == 0
     assert rows(folder) == 1
 
 
@@ -222,6 +225,7 @@ def test_whoever_goes_stops_the_machine_and_no_row_is_lost(tmp_path: Path, pulle
                 run.close()
             elif pulled == "server":
                 served.process.kill()
+                served.process.wait(20)
             else:
                 pids = subprocess.run(
                     ["pgrep", "-P", str(served.process.pid), "-f", "pkmcal.app.measurer"],
@@ -230,7 +234,7 @@ def test_whoever_goes_stops_the_machine_and_no_row_is_lost(tmp_path: Path, pulle
                 assert len(pids) == 1
                 subprocess.run(["kill", "-9", *pids], check=True)
                 assert "look whether the machine moves" in run.next("error")["error"]["message"]
-                run.close()
+            run.close()
             if pulled != "measurer":
                 until(lambda: machine.lines[-1] == "M112")
             assert len(machine.lines) == 3 + (pulled != "measurer")
