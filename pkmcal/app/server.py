@@ -27,7 +27,8 @@ from pkmcal.app.folder import MOST_FILE, MOST_FOLDER, UPLOAD, Folder
 from pkmcal.app.guard import Application, Guard
 from pkmcal.app.live import Live
 from pkmcal.app.process import Message, Worker
-from pkmcal.exceptions import Error
+from pkmcal.exceptions import Error, of_system
+from pkmcal.jobs.plan import GCODE
 from pkmcal.jobs.stated import quoted
 from pkmcal.view import scripts
 
@@ -113,6 +114,7 @@ class Server:
             "commands": commands(folder.project),
             "enter": quoted(["cd", str(folder.path)]),
             "machines": _built_in(),
+            "gcode": GCODE,
         }
 
     async def change(self, request: Request) -> Response:
@@ -129,7 +131,7 @@ class Server:
         except Error as error:
             return _refused(400, str(error))
         except OSError as error:  # a full disk, a folder that may only be read
-            return _refused(507, str(error))
+            return _refused(507, of_system(error))
         return self._changed(request, taken)
 
     async def undo(self, request: Request) -> Response:
@@ -143,7 +145,7 @@ class Server:
         except Error as error:
             return _refused(400, str(error))
         except OSError as error:
-            return _refused(507, str(error))
+            return _refused(507, of_system(error))
 
     def _changed(self, request: Request, taken: bool) -> Response:
         if not taken:

@@ -4,6 +4,7 @@ if (fragment.get('t')) {
   localStorage.setItem('token', fragment.get('t'))
   history.replaceState(null, '', location.pathname)
 }
+addEventListener('hashchange', () => location.hash.startsWith('#t=') && location.reload()) // opened again
 const tab = crypto.randomUUID()
 const headers = { 'x-pkmcal-token': localStorage.getItem('token') ?? '', 'x-pkmcal-tab': tab }
 
