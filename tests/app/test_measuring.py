@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import http.client
 import json
+import os
 import signal
 import subprocess
 import time
@@ -169,6 +170,43 @@ def test_stop_is_at_hand_on_every_screen_and_stops_the_machine(tmp_path: Path) -
         panel.get_by_role("button", name="Close").click()
         assert panel.count() == 0
     assert rows(folder) == 1
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_its_panel_is_fit_for_readers_of_screens_and_for_telephones(
+    tmp_path: Path, dark: bool
+) -> None:
+    axe = os.environ.get("AXE")
+    if not axe:
+        pytest.skip("AXE names no axe-core: make test-app")
+    look = {"color_scheme": "dark" if dark else "light", "viewport": {"width": 390, "height": 844}}
+    with (
+        browser.served(project(tmp_path / "project")) as served,
+        browser.page_of(served, bypass_csp=True, **look) as page,
+    ):
+        page.get_by_role("button", name="3 Measure").click()
+        page.get_by_text("Measure with a machine now").click()
+        form = page.locator("details form")
+        form.get_by_label("within, such as z=0:300").fill("z=5:40")
+        form.get_by_label("or poses").fill("8")
+        form.get_by_label("rest before it is read, s").fill("0")
+        form.get_by_role("button", name="Connect").click()
+        panel = page.locator("#measuring")
+        panel.get_by_role("button", name="Start").click()
+        box = panel.get_by_role("textbox")
+        for row in range(8):
+            panel.get_by_text("press Enter").wait_for()
+            box.press("Enter")
+            panel.get_by_text(f"row {row + 1}, at").wait_for()
+            box.fill("20.0")
+            box.press("Enter")
+        panel.get_by_text("measured as many as asked").wait_for()
+        page.evaluate(Path(axe).read_text(encoding="utf-8"))
+        found = page.evaluate("axe.run(document, { resultTypes: ['violations'] })")
+        assert not found["violations"], [
+            (each["id"], each["nodes"][0]["html"]) for each in found["violations"]
+        ]
+        assert page.evaluate("document.documentElement.scrollWidth") <= 390
 
 
 def test_nothing_moves_without_the_start_of_the_page_that_connected(tmp_path: Path) -> None:
