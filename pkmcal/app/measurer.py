@@ -201,6 +201,7 @@ def main() -> None:
     with os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8") as answers:
         os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
         Measurer(sys.stdin, answers).run()
+    os._exit(0)  # a thread still listens, for which the interpreter would wait
 
 
 if __name__ == "__main__":
