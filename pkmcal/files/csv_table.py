@@ -16,6 +16,7 @@ import math
 import re
 import shlex
 from collections.abc import Callable, Collection, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from os import PathLike
 
@@ -63,6 +64,8 @@ class Column:
         The marks of decimals in its file, each with a cell that can be read in no other way.
     stated : mapping of str to (str, int)
         Units that its file states for all columns, of "mm" and "rad", with their lines.
+    also : bool
+        Whether it is a second reading of a column that is listed already.
     """
 
     name: str
@@ -74,6 +77,7 @@ class Column:
     decimal_comma: bool
     decimals: Mapping[str, str]
     stated: Mapping[str, tuple[str, int]]
+    also: bool = False
 
     def take(self, rows: Sequence[int]) -> Column:
         """The cells of these rows."""
@@ -132,7 +136,7 @@ class Table:
         self._comma = packed or text.separator != ","
         self._header_line = header.line
         self._units = dict(header.units)
-        self.left_out: tuple[str, ...] = ()  # headings of unknown columns
+        self.left_out: dict[str, str | None] = {}  # headings of unknown columns, and their units
         self._forgotten: list[Column] = []
         self._units_taken: dict[str, tuple[str, str]] = {}  # of columns, and where each is stated
         self._default_units = dict(default_units or {})
@@ -215,6 +219,12 @@ class Table:
         self._forgotten += [self.columns[name] for name in names if name in self.columns]
         self.columns = {n: column for n, column in self.columns.items() if n not in names}
 
+    def without(self, names: Collection[str]) -> Table:
+        """The table without some columns; this one keeps them."""
+        found = copy(self)
+        found.columns = {n: column for n, column in self.columns.items() if n not in names}
+        return found
+
     def take(self, rows: Sequence[int]) -> None:
         """Keep these rows, in this order."""
         self.lines = [self.lines[row] for row in rows]
@@ -222,7 +232,7 @@ class Table:
 
     def understood(self) -> tuple[Understood, ...]:
         """List the meaning of each column: those that are read, then those that are left out."""
-        read = [(name, each) for name, each in self.columns.items()]
+        read = [(name, each) for name, each in self.columns.items() if not each.also]
         found = []
         for meaning, column in [*read, *((None, each) for each in self._forgotten)]:
             unit, stated = self._units_taken.get(meaning or "", (None, ""))
@@ -292,7 +302,7 @@ class Table:
         """An error that a column is not there; `otherwise` is said where none was left out."""
         hint = otherwise
         if self.left_out:
-            named = ", ".join(map(repr, self.left_out[:_SHOWN]))
+            named = ", ".join(map(repr, list(self.left_out)[:_SHOWN]))
             more = ", …" if len(self.left_out) > _SHOWN else ""
             number = re.findall(r"\d+", name)[-1:]
             alike = [
