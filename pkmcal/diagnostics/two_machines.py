@@ -15,10 +15,11 @@ from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.diagnostics.reach import reach
 from pkmcal.diagnostics.visits import Visits, visits_of
 from pkmcal.display import chance_text, first_rows, printable
+from pkmcal.estimation.uncertainty import Uncertainty
 from pkmcal.fitted.solution import Solution
 from pkmcal.statistics.distributions import f_tail
 from pkmcal.statistics.group_test import Groups, few_equations, group_test, within_reach
-from pkmcal.statistics.linear_fit import ROUNDING, column_basis, numbered
+from pkmcal.statistics.linear_fit import ROUNDING, LinearFit, column_basis, numbered, reweighted
 from pkmcal.statistics.two_regressions import best_division
 
 CHANCE = 1e-3  # below which a group of rows is of another machine
@@ -119,11 +120,30 @@ def tested(
     cell = np.zeros(len(row), dtype=np.intp)
     for mine in groups.values():
         cell = numbered(cell, mine[row].astype(np.intp))
-    fit = sure.of_own_deviations
+    fit = _with_sets_alike(sure)
     few = few_equations(fit.design, fit.residual, use, key, cell, reach(sure, fit))
     first = np.unique(cell, return_index=True)[1]  # an equation of each cell
     every = {name: few.tested(mine[row][first][few.cell]) for name, mine in groups.items()}
     return {name: each for name, each in every.items() if each is not None}
+
+
+def _with_sets_alike(sure: Uncertainty) -> LinearFit:
+    """The fit in which sets whose noise nobody stated have that of the same component of others.
+
+    A set of another machine may have got a noise that is what common numbers miss of it: then it
+    would say too little of numbers of its own.
+    """
+    fit, equations = sure.of_own_deviations, sure.equations
+    if len(equations.table.sets) == 1 or equations.whole is not None:
+        return fit
+    group = equations.whitening.of_equations(equations.whitening.groups)
+    unstated = equations.blocks.unstated[group]
+    own = np.where(unstated, np.log(sure.factors[group]), 0.0)
+    alike = numbered(sure.labels.component, unstated.astype(np.intp))
+    common = (np.bincount(alike, own) / np.bincount(alike))[alike]
+    if np.allclose(own, common):
+        return fit
+    return reweighted(fit, np.exp(common - own), sure.prior_residual)
 
 
 def _in_no_order(found: Solution, visits: Visits, use: IntArray, key: IntArray) -> Apart | None:
@@ -134,7 +154,7 @@ def _in_no_order(found: Solution, visits: Visits, use: IntArray, key: IntArray) 
     chosen = chosen[:: max(1, -(-len(chosen) // _MOST))]
     among = np.isin(visit[use], chosen)
     use, key = use[among], key[among]
-    fit = sure.of_own_deviations
+    fit = _with_sets_alike(sure)
     few = few_equations(fit.design, fit.residual, use, key, visit, reach(sure, fit))
     unit = numbered(few.cell)
     mine = best_division(few.design, few.residual, unit)

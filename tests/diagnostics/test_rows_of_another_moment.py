@@ -141,6 +141,35 @@ def test_two_files_of_two_machines_are_told_apart() -> None:
     assert ".csv" in doubts(robot, *halves)["two-machines"].text
 
 
+@pytest.mark.filterwarnings("ignore:.*(further than errors|determined to no better)")
+@pytest.mark.parametrize("name", ["3rps", "linear-delta"])
+def test_a_file_of_another_machine_is_not_taken_for_one_of_more_noise(name: str) -> None:
+    """One file is met to its noise, and all that the other is off was called its noise."""
+    rng = np.random.default_rng(13)
+    robot = pk.load(name)
+    width = 6 if name == "3rps" else 3
+    found = []
+    for seed in range(4):
+        at = pk.sample_poses(robot, 45, seed=seed, share=0.5)
+        q, halves = robot.inverse(at, match=True), (slice(0, 22), slice(22, 45))
+        data = [
+            measured(q[rows], noisy(_poses(with_errors(robot, 0.2, rng), width)(q[rows]), rng), f)
+            for rows, f in zip(halves, ("one.csv", "other.csv"), strict=True)
+        ]
+        found.append("two-machines" in doubts(robot, *data))
+    assert found == [True] * 4
+
+
+def test_files_of_unlike_noise_are_not_those_of_two_machines() -> None:
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        robot, q, true = [hexapod, delta, arm][seed % 3](rng)
+        read = noisy(true(rng)(q), rng)
+        read[:30] += 10.0 * (noisy(read[:30], rng) - read[:30])
+        halves = [measured(q[:30], read[:30], "one.csv"), measured(q[30:], read[30:], "other.csv")]
+        assert "two-machines" not in doubts(robot, *halves)
+
+
 def sides(q: np.ndarray, rng: np.random.Generator, lean: float) -> np.ndarray:
     """Half of the rows, the more on one side of the workspace the larger `lean`."""
     place = lean * q[:, 0] / q[:, 0].std() + rng.normal(size=len(q))
