@@ -81,9 +81,9 @@ class Apart:
 
 
 def apart(found: Solution) -> Apart | None:
-    """Test all groups; None where rows are mixtures, residuals rounding errors, or too few."""
+    """Test all groups; None where residuals are rounding errors, or too few."""
     sure = found.fit.uncertainty
-    if sure.mixed or sure.rounded or not sure.equations.whitening.any_read:
+    if sure.rounded or not sure.equations.whitening.any_read:
         return None
     visits = visits_of(found)
     use, key = equations_of_visits(found, visits)
@@ -102,13 +102,29 @@ def apart(found: Solution) -> Apart | None:
 
 
 def equations_of_visits(found: Solution, visits: Visits) -> tuple[IntArray, IntArray]:
-    """Equations (u,) that outliers have no part in, and of which visit and component each is."""
+    """Equations (u,) that outliers have no part in, and of which visit and component each is.
+
+    Of mixtures each stands for itself: components of two poses are unlike.
+    """
     sure = found.fit.uncertainty
-    row = sure.labels.row
-    use = np.flatnonzero(~np.isin(sure.equations.table.rows, found.outliers)[row])
-    use = sure.fit.without_idle(use)
+    row = row_of_equation(sure)
+    odd = np.isin(sure.equations.table.rows, found.outliers)
+    if sure.mixed:
+        block = sure.equations.blocks.block_of_row
+        use = np.flatnonzero(~np.isin(sure.labels.row, block[odd]))
+        return use, np.arange(len(use))
+    use = sure.fit.without_idle(np.flatnonzero(~odd[row]))
     visit = visits.series[row][use], visits.visit[row][use]
     return use, numbered(*visit, sure.labels.component[use])
+
+
+def row_of_equation(sure: Uncertainty) -> IntArray:
+    """Row of each equation (M,), of a mixture the first of its pose."""
+    if not sure.mixed:
+        return sure.labels.row
+    block, first = np.unique(sure.equations.blocks.block_of_row, return_index=True)
+    counted: IntArray = first[block >= 0][sure.labels.row]
+    return counted
 
 
 def tested(
@@ -116,7 +132,7 @@ def tested(
 ) -> dict[str, Groups]:
     """Test each group of rows (N,) against the others; without those too small to be tested."""
     sure = found.fit.uncertainty
-    row = sure.labels.row
+    row = row_of_equation(sure)
     cell = np.zeros(len(row), dtype=np.intp)
     for mine in groups.values():
         cell = numbered(cell, mine[row].astype(np.intp))
@@ -134,7 +150,7 @@ def _with_sets_alike(sure: Uncertainty) -> LinearFit:
     would say too little of numbers of its own.
     """
     fit, equations = sure.of_own_deviations, sure.equations
-    if len(equations.table.sets) == 1 or equations.whole is not None:
+    if sure.mixed or len(equations.table.sets) == 1 or equations.whole is not None:
         return fit
     group = equations.whitening.of_equations(equations.whitening.groups)
     unstated = equations.blocks.unstated[group]
@@ -149,7 +165,8 @@ def _with_sets_alike(sure: Uncertainty) -> LinearFit:
 def _in_no_order(found: Solution, visits: Visits, use: IntArray, key: IntArray) -> Apart | None:
     """Test the division of the visits into two groups that fits best."""
     sure = found.fit.uncertainty
-    visit = numbered(visits.series, visits.visit)[sure.labels.row]
+    row = row_of_equation(sure)
+    visit = numbered(visits.series, visits.visit)[row]
     chosen = np.unique(visit[use])
     chosen = chosen[:: max(1, -(-len(chosen) // _MOST))]
     among = np.isin(visit[use], chosen)
@@ -170,7 +187,7 @@ def _in_no_order(found: Solution, visits: Visits, use: IntArray, key: IntArray) 
     chance = min(1.0, tested.chance * 2.0 ** (len(mine) - 1))
     belongs = np.isin(visit, np.unique(visit[use])[mine])
     rows = np.zeros(len(sure.equations.table.rows), dtype=bool)
-    rows[sure.labels.row[belongs]] = True
+    rows[row[belongs]] = True
     group = f"rows {first_rows(sure.equations.table.rows[rows].tolist(), 6)}"
     return Apart(group, chance, tested.apart, _elsewhere(found, rows, visits))
 
