@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal import arguments
-from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray, as_rows, propagate
 from pkmcal.calibration import summary
-from pkmcal.core import instruments
+from pkmcal.core.instruments import points
 from pkmcal.diagnostics.breakeven import Breakeven, breakeven, in_words
 from pkmcal.diagnostics.checks import AT_ONCE, CHECKS
 from pkmcal.diagnostics.diagnosis import Diagnosis
@@ -28,16 +27,19 @@ from pkmcal.display import Table
 from pkmcal.effects.expansion import in_words as heat_in_words
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.fitted.held_numbers import considered_places
+from pkmcal.fitted.instruments import CalibratedPicture, instruments, pictures
+from pkmcal.fitted.machine_accuracy import machine_accuracy
 from pkmcal.fitted.row_names import row_names
 from pkmcal.fitted.solution import Machine, Solution
-from pkmcal.kinematics.calibratable import as_machine
+from pkmcal.kinematics.calibratable import as_machine, as_parallel
+from pkmcal.readings.reading import Reading
 from pkmcal.result import Result
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _STRONG = 0.95  # correlation worth a word
-_ALIKE = 9  # decimals to which correlations differ that are not equal
+_TIED_DECIMALS = 9  # decimals to which correlations differ that are not equal
 _UNIDENTIFIABLE = 1e-3  # mm a pose moves per mm along an unidentifiable combination
 
 
@@ -106,10 +108,11 @@ class Identification(Solution[Machine], Result):
 
         Nothing is said of kinds with a prior, or that the measurements do not determine.
         """
-        if isinstance(self.robot, SerialArm):
+        robot = as_parallel(self.fit.parameters.robot)
+        if robot is None:
             return ()
         prior = np.asarray(self.fit.estimate.prior.any(axis=0))[self.columns]
-        return law_tests(self.robot.geometry, self, self.fit.uncertainty, prior)
+        return law_tests(robot.geometry, self, self.fit.uncertainty, prior)
 
     @property
     def parameters(self) -> dict[str, dict[str, float]]:
@@ -131,7 +134,7 @@ class Identification(Solution[Machine], Result):
             (self.free[i], self.free[j], float(matrix[i, j]))
             for i, j in zip(first, second, strict=True)
         ]
-        return tuple(sorted(pairs, key=lambda pair: -round(abs(pair[2]), _ALIKE)))
+        return tuple(sorted(pairs, key=lambda pair: -round(abs(pair[2]), _TIED_DECIMALS)))
 
     def _columns(self) -> dict[str, Any]:
         """The parameters: value, deviation and change of each."""
@@ -143,6 +146,28 @@ class Identification(Solution[Machine], Result):
             "start": self.start,
             "change": self.values - self.start,
         }
+
+    @cached_property
+    def instruments(self) -> tuple[Reading, ...]:
+        """The instrument of each set as it was found: a camera with its lens where it is.
+
+        Of sessions that of the last row's.
+        """
+        equations, theta = self.fit.equations, self.fit.end.theta
+        sets = range(len(equations.table.sets))
+        return tuple([*instruments(equations, theta, i)][-1][1] for i in sets)
+
+    @cached_property
+    def pictures(self) -> tuple[CalibratedPicture, ...]:
+        """What each picture of a board shows beside the calibration; empty without a camera."""
+        return tuple(pictures(self))
+
+    def _by_itself(self) -> FloatArray:
+        """Standard deviation of the platform at the measured poses but for its frames, mm (N,)."""
+        end = self.fit.end
+        at = self.fit.parameters.robot.as_commands(end.pose, end.actuators)
+        places = at[np.isfinite(end.pose).all(axis=1)]
+        return machine_accuracy(self.fit, places, places)
 
     def robot_of(self, session: str) -> Machine:
         """The machine with the numbers that it had in a session.
@@ -199,7 +224,7 @@ class Identification(Solution[Machine], Result):
         machine = as_machine(self.robot if session is None else self.robots[session])
         at, actuators, shape = machine.commanded(poses)
         by_numbers = machine.error_twists(at, actuators)[:, :, chosen.places]
-        by_geometry = instruments.points(at, place)[1] @ by_numbers
+        by_geometry = points(at, place)[1] @ by_numbers
         own = chosen.geometry_of(session)
         variance = propagate(by_geometry, self.fit.covariance[np.ix_(own, own)])
         sure = self.fit.uncertainty
@@ -207,7 +232,7 @@ class Identification(Solution[Machine], Result):
             follow = sure.reported[own] @ sure.considered
             places, root = considered_places(chosen)
             alone = machine.error_twists(at, actuators)[:, :, places]
-            moved_by = instruments.points(at, place)[1] @ alone @ root - by_geometry @ follow
+            moved_by = points(at, place)[1] @ alone @ root - by_geometry @ follow
             variance += (moved_by**2).sum(axis=(1, 2)) - ((by_geometry @ follow) ** 2).sum(
                 axis=(1, 2)
             )
@@ -309,8 +334,11 @@ class Identification(Solution[Machine], Result):
             yield summary.filled("", heat)
         yield summary.misfit_table(self)
         yield summary.quality(self)
+        if self.pictures:
+            yield summary.pictures(self.pictures)
+            yield summary.by_itself(self._by_itself())
         datasets, chosen = self.fit.equations.prediction.datasets, self.fit.parameters
-        framed = len(self.free) > len(chosen.places) or isinstance(self.robot, SerialArm)
+        framed = len(self.free) > len(chosen.places) or chosen.robot.kind == "arm"
         if self.datum.names:
             yield summary.filled("", str(self.datum))
         yield from summary.limits(

@@ -6,15 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pkmcal.arrays import largest_first
+from pkmcal.arrays import TIED, largest_first
 from pkmcal.diagnostics.check import Check, Remedy, at_most_one
 from pkmcal.display import chance_text
 from pkmcal.fitted.solution import Solution
 from pkmcal.statistics.distributions import t_tail
-from pkmcal.statistics.prior_test import CONTRADICTED, PriorTest
+from pkmcal.statistics.prior_test import PriorTest
 
 _PULLED = 2.0  # times what is expected, from which a pull on a prior is worth a word
-_ALIKE = 1e-6  # share by which pulls differ that are not equal
+_WRONG = 0.005  # chance below which an uncertainty is stated wrongly
 
 
 def _contradicted(found: Solution) -> tuple[PriorTest, ...]:
@@ -25,7 +25,7 @@ def _contradicted(found: Solution) -> tuple[PriorTest, ...]:
 def _contradicted_text(found: Solution, test: PriorTest) -> str:
     """State the chance, the numbers that are pulled most, and a width that would agree."""
     pulls, stated = np.nan_to_num(test.pulls), found.fit.parameters.prior_names
-    worst = [k for k in largest_first(np.abs(pulls), _ALIKE)[:3] if abs(pulls[k]) > _PULLED]
+    worst = [k for k in largest_first(np.abs(pulls), TIED)[:3] if abs(pulls[k]) > _PULLED]
     shown = ", ".join(f"{stated[k]} {abs(pulls[k]):.1f}" for k in worst)
     pulled = f" and pull {shown} times as far as prior and noise let expect" if worst else ""
     return (
@@ -67,11 +67,12 @@ def _uncertainty_contradicted(found: Solution) -> tuple[WrongUncertainty, ...]:
     judged = [each for each in found.nuisances if np.isfinite(each.pull)]
     if test is None or not judged:
         return ()
-    chances = [2.0 * len(judged) * t_tail(abs(each.pull), np.inf) for each in judged]
-    far = [each for each, own in zip(judged, chances, strict=True) if own < CONTRADICTED]
+    tests = 2.0 * len(judged)  # of each, and of all together
+    chances = [tests * t_tail(abs(each.pull), test.freedom) for each in judged]
+    far = [each for each, own in zip(judged, chances, strict=True) if own < _WRONG]
     far.sort(key=lambda each: -abs(each.pull))
     chance = min(1.0, 2.0 * test.chance, *chances)
-    if chance >= CONTRADICTED:
+    if chance >= _WRONG:
         return ()
     names, pulls = tuple(e.name for e in far), tuple(abs(e.pull) for e in far)
     return (WrongUncertainty(names, pulls, chance, test.factor),)

@@ -26,11 +26,13 @@ from pkmcal.estimation.parameters import Asked, Bounds, Parameters
 from pkmcal.estimation.prior_functions import is_function, prior_functions
 from pkmcal.estimation.scales import unit_scales
 from pkmcal.estimation.sessions import Scope, label, matches, scopes
-from pkmcal.estimation.uncertain_numbers import spread, uncertain_names
+from pkmcal.estimation.uncertain_numbers import own_deviations, spread, uncertain_names
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.geometry.elastic import is_kinematic
 from pkmcal.geometry.stated_uncertainty import LEAST, MOST
 from pkmcal.kinematics.calibratable import Calibratable
+
+_EXACT = 1e-7  # mm that a number moves the machine by: what is stated to be less is exact as well
 
 
 def parameters(
@@ -56,26 +58,29 @@ def parameters(
     """
     geometry = robot.geometry
     free, along = _free_names(robot, asked)
-    places = np.array([geometry.names.index(name) for name in (*free, *along)], dtype=np.intp)
+    known = geometry.names
+    places = np.array([known.index(name) for name in (*free, *along)], dtype=np.intp)
     beside = _beside_geometry(datasets) | _of_residuals(asked.residuals, geometry.names)
     ends = np.cumsum([len(places), *(len(each.names) for each in beside.values())]).tolist()
     blocks = dict(zip(beside, map(slice, ends, ends[1:]), strict=False))
-    numbers = [geometry.names[i] for i in places]
+    numbers = [known[i] for i in places.tolist()]
     numbers += [name for each in beside.values() for name in each.names]
     scope = scopes(numbers, blocks, asked.per_session, asked.by_set)
     entries = _entries(len(places), scope, blocks, datasets, asked.held_points)
     fitted_along = {*range(len(free), len(places))}
-    for (role, _), block in blocks.items():
-        if role in asked.uncertain_roles:
+    beside_known = set[int]()
+    for point, block in blocks.items():
+        if point[0] in asked.uncertain_roles:
             fitted_along |= {*range(block.start, block.stop)}
-    entries = _without_exact(entries, numbers, fitted_along, asked)
+        if beside[point].spread is not None:
+            beside_known |= {*range(block.start, block.stop)}
+    entries = _without_exact(entries, numbers, fitted_along - beside_known, asked)
+    fitted_along |= beside_known
     number_of = np.array([number for number, _ in entries], dtype=np.intp)
     names = tuple(numbers[j] + (f"@{behind}" if behind else "") for j, behind in entries)
     uncertain = np.isin(number_of, sorted(fitted_along))
-    of_uncertain = spread(
-        asked.uncertainty, [n for n, own in zip(names, uncertain, strict=True) if own]
-    )
-    every = [geometry.units[i] for i in places]
+    units_of = geometry.units
+    every = [units_of[i] for i in places.tolist()]
     every += [unit for each in beside.values() for unit in each.units]
     if not names:
         raise ArgumentError("free: name at least one parameter, nothing else is unknown")
@@ -88,6 +93,13 @@ def parameters(
     ]
     of_unit = unit_scales(robot, [data.measured for data in datasets])
     scale = _scales(np.concatenate(of_number)[number_of], of_unit, names, units, like)
+    along = [n for n, own in zip(names, uncertain, strict=True) if own]
+    least = _EXACT * scale[uncertain]
+    small = own_deviations(asked.uncertainty, along) < least
+    of_uncertain = spread(asked.uncertainty, along) + np.diag(np.where(small, least, 0.0) ** 2)
+    along_entries = [entry for entry, own in zip(entries, uncertain, strict=True) if own]
+    for point, block in blocks.items():
+        _add_known(of_uncertain, along_entries, block, beside[point].spread)
     starts = [geometry.values[places], *(each.start for each in beside.values())]
     values = np.concatenate(starts)[number_of]
     count = int(np.count_nonzero(number_of < len(places)))
@@ -125,6 +137,24 @@ def parameters(
     columns = {session: made.geometry_of(session) for session in made.sessions or ("",)}
     given = (asked.prior, robot, start, places, columns)
     return replace(made, functions=prior_functions(*given, strict=like is None))
+
+
+def _add_known(
+    spread: FloatArray,
+    entries: Sequence[tuple[int, str]],
+    block: slice,
+    known: FloatArray | None,
+) -> None:
+    """Add what a reading itself knows of numbers to the covariance of uncertain ones (u, u)."""
+    if known is None:
+        return
+    for behind in dict.fromkeys(behind for _, behind in entries):
+        mine = [
+            i for i, (j, own) in enumerate(entries)
+            if own == behind and block.start <= j < block.stop
+        ]  # fmt: skip
+        slots = [entries[i][0] - block.start for i in mine]
+        spread[np.ix_(mine, mine)] += known[np.ix_(slots, slots)]
 
 
 def _refuse_twice(names: Sequence[str]) -> None:
@@ -224,6 +254,11 @@ def _beside_geometry(datasets: Sequence[FitData]) -> dict[tuple[str, str], Numbe
                     f"effects or kind: two of them have numbers of one role, {role!r}, that are not"
                     f" alike: {', '.join(known.names)} [{', '.join(known.units)}] and"
                     f" {', '.join(own.names)} [{', '.join(own.units)}]; give each a role of its own"
+                )
+            if not np.isfinite(own.start).all():
+                raise ArgumentError(
+                    f"{role}: the search for {', '.join(own.names)} has a start that is no finite"
+                    " number"
                 )
             if not np.array_equal(known.start, own.start):
                 raise ArgumentError(
@@ -331,7 +366,8 @@ def _prior(
     """Return the prior of each parameter: as effects state it, unless `prior` names it."""
     prior = asked.prior
     sigma = np.full(len(names), np.inf)
-    of_effects = [asked.of_effects.get(name.partition("@")[0], np.inf) for name in names]
+    own = asked.of_effects
+    of_effects = [own.get(name.partition("@")[0], np.inf) if own else np.inf for name in names]
     if isinstance(prior, Mapping):
         sigma[:] = of_effects
     if isinstance(prior, Mapping):

@@ -22,8 +22,7 @@ from pkmcal.estimation.mirror import MIRROR, mirror_fits
 from pkmcal.estimation.uncertainty import Uncertainty
 from pkmcal.fitted.distances import distances
 from pkmcal.fitted.dropped import outlying
-from pkmcal.fitted.nuisances import in_result, nuisances
-from pkmcal.kinematics.robot import Robot
+from pkmcal.fitted.nuisances import CHECKED, in_result, nuisances
 from pkmcal.statistics.distributions import t_factor
 from pkmcal.statistics.linear_fit import triangle
 from pkmcal.statistics.prior_test import LEAST_FREEDOM, PriorTest, left_alone, prior_test
@@ -88,7 +87,7 @@ def identifiability(estimator: Estimator, estimate: Estimate, hidden: int) -> di
     chosen = equations.parameters
     names: tuple[str, ...] = ()
     rest = measured.unidentifiable
-    yields = isinstance(chosen.robot, Robot) and chosen.robot.model.elastic is not None
+    yields = chosen.robot.model.elastic is not None
     if equations.machines.unknowns or yields:
         names, rest = gauges(chosen, rest)
         if len(estimate.prior):  # a tape on two anchors ends the scale, say
@@ -218,4 +217,5 @@ def tested_prior(
         ]
     factor = triangle(columns)
     k = len(rows)
-    return prior_test(factor[:, :k], factor[:, k:-1], factor[:, -1], variance, freedom)
+    least = CHECKED if of_uncertain else 0.0
+    return prior_test(factor[:, :k], factor[:, k:-1], factor[:, -1], variance, freedom, least)

@@ -11,6 +11,8 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
+from os import PathLike
 from typing import Any, ClassVar, Literal, NamedTuple, Protocol, TypeVar
 
 import numpy as np
@@ -23,7 +25,14 @@ from pkmcal.files.csv_writer import WrittenColumn
 from pkmcal.readings import orientation, rows
 from pkmcal.readings.alignment import Laid, Sighting
 from pkmcal.readings.measured import InFit, Measured
-from pkmcal.readings.predicted import At, Lots, Predicted, Shared, require_predicted
+from pkmcal.readings.predicted import (
+    At,
+    Lots,
+    Predicted,
+    Shared,
+    require_arguments,
+    require_predicted,
+)
 from pkmcal.readings.unknowns import Dependence, Found
 
 Components = tuple[tuple[str, str], ...]
@@ -60,6 +69,36 @@ class Family(NamedTuple):
     def noun(self) -> str:
         """Noun for these readings."""
         return {"mm": "lengths", "rad": "angles"}.get(self.unit, f"readings in {self.unit}")
+
+
+@cache
+def families_by_unit(units: tuple[str, ...]) -> tuple[Family, ...]:
+    """Families of components that have the same of these units."""
+    return tuple(
+        Family(unit, tuple(k for k, each in enumerate(units) if each == unit))
+        for unit in dict.fromkeys(units)
+    )
+
+
+class HeldNumbers(NamedTuple):
+    """Numbers of an instrument that a calibration holds and that may be wrong.
+
+    Attributes
+    ----------
+    name : str
+        What is wrong then, as messages say it.
+    cure : str
+        What helps.
+    argument : str
+        The argument of `Reading.predict` that has them.
+    slots : tuple of int
+        Which of its numbers they are.
+    """
+
+    name: str
+    cure: str
+    argument: str
+    slots: tuple[int, ...]
 
 
 class Reading:
@@ -105,6 +144,8 @@ class Reading:
         Whether poses can be planned for the object that its word stands for.
     starts_by_pose : bool
         Whether `starts` needs the poses of the nominal machine.
+    held : tuple of HeldNumbers
+        Numbers of the instrument that are held unless asked otherwise, and may be wrong.
     by_rows : tuple of str
         Arguments of `shared` that rows depend on by themselves, not through their lot's motion.
     per_row : tuple of str
@@ -140,6 +181,7 @@ class Reading:
     by_firmware: ClassVar[bool] = False
     planned: ClassVar[bool] = True
     starts_by_pose: ClassVar[bool] = False
+    held: ClassVar[tuple[HeldNumbers, ...]] = ()
     by_rows: ClassVar[tuple[str, ...]] = ()
     per_row: ClassVar[tuple[str, ...]] = ()
     labels: ClassVar[tuple[str, ...]] = ()
@@ -214,6 +256,39 @@ class Reading:
         """
         return m.values
 
+    def as_found(self: Own, numbers: Mapping[str, float]) -> Own:
+        """The instrument with what a calibration found of it, by the names of its numbers.
+
+        By default itself.
+        """
+        return self
+
+    @property
+    def file_name(self) -> str:
+        """The name of the file of an instrument as it was found; "" of those that have none."""
+        return ""
+
+    def drawn(self) -> dict[str, Any] | None:
+        """Tell a page where an instrument as it was found stands and what it sees, or None."""
+        return None
+
+    @property
+    def motions(self) -> Mapping[str, FloatArray]:
+        """Motions (4, 4) of an instrument as it was found, by what they take to what; mm."""
+        return {}
+
+    def write(self, path: str | PathLike[str], comment: str = "") -> None:
+        """Write the instrument as it was found; `comment` are lines for the head of the file."""
+        raise NotImplementedError
+
+    def pictures(self, m: Measured, pose: FloatArray, off: FloatArray) -> Sequence[Any]:
+        """Tell what each picture shows, of readings that are taken in pictures; else nothing.
+
+        Of an instrument as it was found. `pose` (N, 6) are those of the machine where its actuators
+        say that it is, `off` (N, k) measured less predicted there.
+        """
+        return ()
+
     def follows_pose(self, machine: Any) -> bool:
         """Return whether it follows from one pose of the platform, wherever the actuators are."""
         return True
@@ -231,8 +306,9 @@ class Reading:
 
     def simulated(self, m: Measured, solve: Solve) -> FloatArray:
         """Compute what the instrument would read without noise, (N, k)."""
-        at = At(solve(m.actuators, "q").pose, axis=np.full(len(m), 2))
-        found = self.predict(at, **self.arguments(m))
+        at, given = At(solve(m.actuators, "q").pose, axis=np.full(len(m), 2)), self.arguments(m)
+        require_arguments(self.name, self.predict, at, given, "arguments")
+        found = self.predict(at, **given)
         require_predicted(self.name, len(self.components), len(m), found)
         return found.values
 
@@ -290,10 +366,7 @@ class Reading:
     @property
     def families(self) -> tuple[Family, ...]:
         """Return the components by unit: lengths or angles, say, may be wrong by themselves."""
-        return tuple(
-            Family(unit, tuple(k for k, each in enumerate(self.units) if each == unit))
-            for unit in dict.fromkeys(self.units)
-        )
+        return families_by_unit(self.units)
 
     def arcs(self, m: Measured, length: float) -> FloatArray:
         """Return factors from each component's residual to mm (k,): one number for all rows."""

@@ -8,21 +8,21 @@ from typing import Any
 import numpy as np
 
 from pkmcal import display
-from pkmcal.arms.arm import SerialArm
-from pkmcal.arrays import FloatArray, largest_first, propagate, rms
+from pkmcal.arrays import TIED, FloatArray, largest_first, propagate, rms
 from pkmcal.calibration.identification import Identification
 from pkmcal.core.library import POSE
 from pkmcal.display import printable
 from pkmcal.estimation import misfits
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.fit_data import FitData
+from pkmcal.fitted.machine_accuracy import machine_accuracy
 from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.measurements.iso9283 import performance
 from pkmcal.measurements.repeats import groups
+from pkmcal.readings.constants import names_of_constants
 from pkmcal.report.places import Places
 
 _WORST = 10  # rows that are listed
-_ALIKE = 1e-6  # mm by which distances differ that are not equal
 _MOSTLY, _ONLY = 0.5, 0.99  # of the prior's deviation, above which the prior dominates
 _ELSEWHERE = 1.0  # mm: a pose so far from the desired one is of another assembly mode
 _NEGLIGIBLE = 1e-3  # share of a parameter in unidentifiable combinations
@@ -79,9 +79,37 @@ def instrument_identified(found: Identification) -> bool:
 
 def export_command(found: Identification) -> str:
     """Return the command that writes the calibrated machine for its firmware; "" of others."""
-    if isinstance(found.robot, SerialArm) or found.robot.model.controller is None:
-        return ""
-    return found.robot.model.controller.command("robot.toml")
+    controller = found.fit.parameters.robot.model.controller
+    return "" if controller is None else controller.command("robot.toml")
+
+
+def instruments(found: Identification) -> list[dict[str, Any]]:
+    """List instruments of which a file is written: its name, their numbers, motions in mm."""
+    listed = {}
+    for each in found.instruments:
+        if each.file_name:
+            numbers = {name: getattr(each, name) for name in names_of_constants(each)}
+            listed[each.file_name] = {
+                "file": each.file_name,
+                "numbers": {k: v for k, v in numbers.items() if isinstance(v, int | float)},
+                "motions": {name: motion.tolist() for name, motion in each.motions.items()},
+            }
+    return [*listed.values()]
+
+
+def pictures(found: Identification) -> list[dict[str, Any]]:
+    """List pictures of boards: what each shows beside the calibration; mm, rad and px."""
+    return [
+        {
+            "name": each.name,
+            "use": each.use,
+            "camera": each.camera,
+            "board": each.board,
+            "outliers": each.outliers,
+            **vars(each.seen),
+        }
+        for each in found.pictures
+    ]
 
 
 def directions(found: Identification) -> list[dict[str, Any]]:
@@ -133,7 +161,7 @@ def worst(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Select the rows with the largest distances after the calibration."""
     read = [row for row in rows if np.isfinite(row["after"])]
     off = np.array([row["after"] for row in read])
-    return [read[i] for i in largest_first(off, _ALIKE)[:_WORST]]
+    return [read[i] for i in largest_first(off, TIED)[:_WORST]]
 
 
 def moved(rows: list[dict[str, Any]]) -> list[tuple[int, str, str, int]]:
@@ -229,14 +257,27 @@ def iso9283(found: Identification) -> list[dict[str, Any]]:
     return scores
 
 
-def expected(found: Identification, places: FloatArray) -> FloatArray:
+def expected(
+    found: Identification, places: FloatArray, reference: FloatArray | None = None
+) -> FloatArray:
     """Predict the standard deviation of the tool, mm (N,), at poses (N, 6) or joints (N, n).
 
     Where the instrument's frame or targets were identified too, that of the first target in the
     instrument's frame: in the base frame it would contain the pose of the base, which no
-    measurement determines.
+    measurement determines. Of an instrument that reads no lengths, as a camera, that of the machine
+    by itself, whose frames are moved over the `reference` places, by default these.
     """
-    return as_seen(found, places) if instrument_identified(found) else found.accuracy(places)
+    if not instrument_identified(found):
+        return found.accuracy(places)
+    if reads_lengths(found):
+        return as_seen(found, places)
+    return machine_accuracy(found.fit, places, places if reference is None else reference)
+
+
+def reads_lengths(found: Identification) -> bool:
+    """Say whether what the first instrument reads, in the last session, are lengths."""
+    data, _ = _first_of_last(found)
+    return data.measured.instrument.units[:1] == ("mm",)
 
 
 def as_seen(found: Identification, places: FloatArray) -> FloatArray:
@@ -295,13 +336,15 @@ def over_the_workspace(
     if places.area is None:
         return sampled, None
     area = places.area
-    return sampled, Slice(area.axes, area.values, area.filled(expected(found, area.poses)))
+    return sampled, Slice(
+        area.axes, area.values, area.filled(expected(found, area.poses, places.poses))
+    )
 
 
 def over_the_measured(found: Identification) -> FloatArray:
     """Predict the accuracy at the poses that were measured, mm; those that are known."""
-    end = found.fit.end
-    predicted = expected(found, end.actuators if isinstance(found.robot, SerialArm) else end.pose)
+    end, machine = found.fit.end, found.fit.parameters.robot
+    predicted = expected(found, machine.as_commands(end.pose, end.actuators))
     return predicted[np.isfinite(predicted)]
 
 

@@ -34,7 +34,14 @@ def element(found: Identification) -> tuple[str, str]:
     data = page.machine(robot, cloud=False)  # the report has its own pictures of the workspace
     data["places"] = measured_poses(found)
     data["calibration"] = {"points": _points(found), "change": change(found)}
+    if seen := cameras(found):
+        data["cameras"] = seen
     return page.plain_element(data)
+
+
+def cameras(found: Identification) -> list[dict[str, Any]]:
+    """Cameras as they were found, and their boards: places in the base and on what is carried."""
+    return [view for each in found.instruments if (view := each.drawn()) is not None]
 
 
 def _points(found: Identification) -> list[dict[str, Any]]:
@@ -74,9 +81,9 @@ def change(found: Identification) -> dict[str, Any]:
     None of a machine with drive laws, whose numbers are not in the memory of the page's core: there
     the machine as assumed is not overlaid.
     """
-    if isinstance(found.robot, Robot) and found.robot.model.driven:
-        return {"places": [], "before": [], "after": [], "times": 1, "most": 1}
     parameters = found.fit.equations.parameters
+    if parameters.robot.model.driven:
+        return {"places": [], "before": [], "after": [], "times": 1, "most": 1}
     assumed = as_given(parameters.robot.replace(parameters.values_at(found.fit.start.theta)))
     before, after = _numbers(assumed), _numbers(found.robot)
     places = np.flatnonzero(before != after)
