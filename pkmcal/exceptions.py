@@ -40,3 +40,10 @@ class MissingFileError(FileNotFoundError, FileError):
 
 class CalibrationWarning(_Shown, UserWarning):
     """A warning of `identify` about a fit that succeeded."""
+
+
+def of_system(error: OSError) -> str:
+    """Return the words of an error of the system, the file that it is about first."""
+    if type(error).__str__ is OSError.__str__ and error.strerror and error.filename:
+        return f"{error.filename}: {error.strerror}"
+    return str(error)

@@ -49,6 +49,15 @@ class Result(ReadOnly):
     def __str__(self) -> str:
         return visible("\n".join(str(part) for part in self._parts()))
 
+    def paragraphs(self) -> list[str]:
+        """Return what it says in words, a paragraph each, without breaks; the title is first."""
+        texts = (part for part in self._parts() if isinstance(part, str))
+        return [visible(" ".join(text.split())) for text in texts if text]
+
+    def tables(self) -> list[str]:
+        """Return its tables as a terminal shows them."""
+        return [visible(str(part)) for part in self._parts() if isinstance(part, Table)]
+
     def _columns(self) -> Mapping[str, Sequence[Any]]:
         """Columns of a data frame by heading; a result that has rows gives them."""
         raise ArgumentError(f"a {type(self).__name__} has no rows to make a data frame of")
@@ -134,7 +143,9 @@ def failed_rows(
     most : int
         How many rows are listed of each status.
     """
-    parts = []
+    parts: list[str] = []
+    if not status.any():
+        return ""
     for code, words in meanings.items():
         rows = np.flatnonzero(status == code)
         if code and rows.size:

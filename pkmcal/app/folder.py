@@ -12,10 +12,10 @@ import json
 import shutil
 import sys
 from collections.abc import Mapping
-from itertools import count
 from pathlib import Path
 from typing import Any
 
+from pkmcal.app.aside import free_place
 from pkmcal.app.commands import OUTPUTS, PLAN, REPORT
 from pkmcal.app.names import safe_name
 from pkmcal.exceptions import ArgumentError
@@ -105,8 +105,8 @@ class Folder:
         if version != self.version:
             return False
         project = Project.of_table(table)
-        self._inside(project)
         self.refuse_links(project)
+        self._inside(project)
         if project != self.project:
             self._before = [*self._before, self.project][-_UNDO:]
             self._take(project)
@@ -142,17 +142,13 @@ class Folder:
         place, former = self.path / name, None
         own = place.is_file() and not place.is_symlink()  # a link goes, what it leads to stays
         if own and not filecmp.cmp(place, content, shallow=False):
-            former = self._free(place)
+            former = free_place(place)
             shutil.copy2(place, former)
         content.replace(place)
         return name, None if former is None else former.name
 
-    def _free(self, place: Path) -> Path:
-        numbered = (place.with_name(f"{place.stem}.{k}{place.suffix}") for k in count(1))
-        return next(each for each in numbered if not each.exists())
-
     def refuse_links(self, project: Project) -> None:
-        """Refuse symbolic links by which what is written would be written elsewhere.
+        """Refuse symbolic links that lead out of the folder: of what is read, or written.
 
         Raises
         ------
@@ -160,13 +156,17 @@ class Folder:
             With the link's name.
         """
         made = Path(project.importing.out).parts[:1] if project.importing else ()
+        read = {Path(name).parts[0] for name in named(project)}
         for each in self.path.iterdir():
-            if _is_own(each.name) or each.name in made:
+            if _is_own(each.name) or each.name in made or each.name in read:
                 below = each.rglob("*") if each.is_dir() and not each.is_symlink() else ()
                 for one in (each, *below):
                     if one.is_symlink() and not self._is_within(one):
                         name = json.dumps(str(one.relative_to(self.path)))
-                        raise ArgumentError(f"{name} is a link that leads out of this project")
+                        raise ArgumentError(
+                            f"{name} is a link that leads out of this project: copy there what it"
+                            " leads to"
+                        )
 
     def written(self, path: str) -> Path | None:
         """Return a file of the folder that may be taken away, or None."""

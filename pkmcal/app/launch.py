@@ -80,6 +80,7 @@ def _serve(
         config = uvicorn.Config(
             application, log_level="error", access_log=False,
             proxy_headers=False, server_header=False, timeout_graceful_shutdown=1, lifespan="on",
+            ws="none",
         )  # fmt: skip
         say(f"{folder.path}\n{url}")
         _Ending(config, end).run(sockets=[listening])

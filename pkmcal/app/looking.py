@@ -16,6 +16,8 @@ from pkmcal.jobs.calibration import Calibration
 from pkmcal.jobs.inputs import Inputs
 from pkmcal.jobs.read_files import read_file
 from pkmcal.kinematics.calibratable import Calibratable
+from pkmcal.kinematics.reading_units import reading_units
+from pkmcal.measurements.listing import table, title
 from pkmcal.measurements.measurements import Measurements
 
 Table = dict[str, Any]
@@ -36,6 +38,11 @@ def columns(measured: Sequence[Measurements]) -> list[Table]:
         {"file": one.file, "heading": one.heading, "unit": one.unit, "said": _said(one)}
         for one in found.values()
     ]
+
+
+def listed(measured: Measurements, machine: Calibratable) -> str:
+    """Return the rows as they were read, in units of what the machine's actuators read."""
+    return f"{title(measured)}\n{table(measured, reading_units(machine))}"
 
 
 def headings(names: Iterable[str]) -> list[Table]:
@@ -81,7 +88,7 @@ def _joined(way: str, job: Calibration, machine: Calibratable, inputs: Inputs) -
         for name in job.files:
             read = read_file(name, machine, reading, inputs, lambda note: None)
             said += [note.partition(": ")[2] for note in read.notes if "joined with" in note]
-            shown.append(str(read.select(range(min(_PREVIEW, len(read))))))
+            shown.append(listed(read.select(range(min(_PREVIEW, len(read)))), machine))
     except (Error, OSError) as error:
         return {"way": way, "said": str(error).partition("; ")[2] or str(error), "text": ""}
     return {"way": way, "said": "; ".join(said), "text": "\n".join(shown)}

@@ -21,6 +21,11 @@ _FAILED = (
 Message = dict[str, Any]
 Process = asyncio.subprocess.Process
 _REST = 0.5  # s without a request, after which the next process is started
+# The process works in the user's folder, of which no file may be taken for a module: Python looks
+# there first (-P, which says the same, is not known to Python 3.10).
+_WORKER = (
+    "import sys; sys.path[:] = filter(None, sys.path);from pkmcal.app.worker import main; main()"
+)
 
 
 class Worker:
@@ -70,7 +75,7 @@ class Worker:
         threads = {"OPENBLAS_NUM_THREADS": "1", **os.environ}  # as the command line has it
         with open(log, "ab") as errors:
             return await asyncio.create_subprocess_exec(
-                sys.executable, "-m", "pkmcal.app.worker",
+                sys.executable, "-c", _WORKER,
                 stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE, stderr=errors,
                 cwd=self._folder, limit=_LONGEST_LINE, env={**threads, "PYTHONUTF8": "1"},
             )  # fmt: skip

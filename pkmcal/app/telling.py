@@ -33,6 +33,14 @@ else:
 Table = dict[str, Any]
 LEVELS = {"grave": "not calibrated", "doubt": "doubtful", "remark": "note"}
 _MOST_ROWS, _MOST_ARROWS = 3000, 1000  # that are listed and drawn: the worst
+ROWS = {
+    "caption": "Measured rows: their distance from where the machine is by its numbers, mm",
+    "heads": ["use", "row", "before", "after", "remark"],
+}
+NUMBERS = {
+    "caption": "Numbers that are found; ± is one standard deviation",
+    "heads": ["find", "number", "value", "±", "change", "unit", "knowledge"],
+}
 STATEMENTS = ("machine", "serial", "customer", "operator", "date", "instrument", "temperature",
                "method")  # fmt: skip
 
@@ -87,7 +95,9 @@ def calibration(found: Identification, job: Calibration, lines: Lines) -> Table:
         },
         "summary": found.summary(),
         "rows": rows,
+        "of_rows": ROWS,
         "numbers": _numbers(found),
+        "of_numbers": NUMBERS,
         "machine": names,
         "others": [name for name in names if name not in free],
         "held": [(name, "held") for name in job.fix],
@@ -143,8 +153,7 @@ def _rows(
         file, line = of[row] if row < len(of) else ("", -1)
         by_line = f"{file}:{line}" if line > 0 else None
         one: Table = {"key": f"held {row}" if held else str(row), "name": listed.name[k],
-                      "before": _number(listed.off_before[k], 4),
-                      "after": _number(listed.off[k], 4)}  # fmt: skip
+                      "off": [_off(listed.off_before[k]), _off(listed.off[k])]}  # fmt: skip
         if held:
             one["drop"] = by_line
         if by_line in dropped:
@@ -216,6 +225,13 @@ def stated(path: Path) -> dict[str, str]:
 def _number(value: float, digits: int = 7) -> float | None:
     """Return a number with the digits that a page needs; None where it is none."""
     return float(f"{value:.{digits}g}") if np.isfinite(value) else None
+
+
+def _off(value: float) -> str:
+    """Return a distance as it is shown, in mm."""
+    if not np.isfinite(value):
+        return "–"
+    return f"{value:.0f}" if value >= 1000.0 else f"{value:.3g}"
 
 
 def _vector(values: FloatArray | Iterable[float]) -> list[float]:

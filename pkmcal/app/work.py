@@ -19,6 +19,7 @@ from typing import Any, get_args
 
 import pkmcal as pk
 from pkmcal.app import looking, taking, telling
+from pkmcal.app.aside import set_aside
 from pkmcal.app.commands import PLAN, REPORT, export, offered
 from pkmcal.app.folder import named
 from pkmcal.app.names import safe_name
@@ -26,7 +27,7 @@ from pkmcal.app.sheet import sheet
 from pkmcal.checks.check_geometry import check_geometry
 from pkmcal.controllers.firmwares import Firmware
 from pkmcal.display import printable
-from pkmcal.exceptions import ArgumentError, Error
+from pkmcal.exceptions import ArgumentError, Error, of_system
 from pkmcal.files.atomic import write_whole
 from pkmcal.geometry.controller import Controller
 from pkmcal.jobs import calibrating, exporting, importing, planning
@@ -38,6 +39,8 @@ from pkmcal.jobs.project import Project
 from pkmcal.jobs.stated import quoted
 from pkmcal.jobs.written import Written, save_robot
 from pkmcal.kinematics.calibratable import as_machine
+from pkmcal.live import registry
+from pkmcal.live.measuring_run import Rules
 from pkmcal.view import page
 
 Table = dict[str, Any]
@@ -118,8 +121,10 @@ def machine(work: Work, state: Table, given: Table, say: Say) -> Table:
         if project.importing is not None:
             say("reading the configuration")
             printer = importing.run(project.importing, inputs)
-            paths = importing.write(project.importing, printer, inputs, force=True)
-            found["notes"] = str(printer).splitlines()
+            paths = [Path(project.importing.out) / name for name in importing.files(printer)]
+            found["notes"] = [*str(printer).splitlines(), *set_aside(paths)]
+            found["machines"] = _machines(project)
+            importing.write(project.importing, printer, inputs, force=True)
             found["stored"] = [str(each) for each in paths[1:]]
         robot = pk.load(inputs.robot(project.calibration.robot))
     except (Error, OSError) as error:
@@ -156,12 +161,14 @@ def plan(work: Work, state: Table, given: Table, say: Say) -> Table:
     say("choosing poses", 0.1)
     made = planning.planned(project.plan, sources)
     output = Output(Path(PLAN), planning.files(project.plan), inputs, True)
+    said = set_aside(output.paths)
     with output.draft() as draft:
-        planning.write(made, draft, inputs.comment())
+        planning.write(project.plan, made, draft, inputs.comment())
     shown = page.machine(made.robot, cloud=False)
     shown["places"] = page.places("planned poses", made.robot, made.poses)
-    return {"text": str(made), "files": [str(each) for each in output.paths], "view": shown,
-            "sheet": sheet(made)}  # fmt: skip
+    files = [str(each) for each in output.paths]
+    return {"words": made.paragraphs(), "table": "\n".join(made.tables()), "files": files,
+            "view": shown, "said": said, "sheet": sheet(made)}  # fmt: skip
 
 
 def look(work: Work, state: Table, given: Table, say: Say) -> Table:
@@ -192,8 +199,19 @@ def look(work: Work, state: Table, given: Table, say: Say) -> Table:
         "notes": list(
             dict.fromkeys([*work.notes, *(note for each in measured for note in each.notes)])
         ),
-        "text": [str(each) for each in measured],
+        "text": [looking.listed(each, machine) for each in measured],
     }
+
+
+def devices(work: Work, state: Table, given: Table, say: Say) -> Table:
+    """Say which machines can be driven and which instruments read, with what addresses."""
+    rules = {name: value for name, value in vars(Rules()).items() if value is not None}
+    return {"machines": _addresses(registry.MACHINES), "rules": rules,
+            "instruments": _addresses(registry.INSTRUMENTS)}  # fmt: skip
+
+
+def _addresses(kinds: dict[str, Any]) -> list[tuple[str, str]]:
+    return [(word, kind.ADDRESS) for word, kind in kinds.items()]
 
 
 def fit(work: Work, state: Table, given: Table, say: Say) -> Table:
@@ -212,6 +230,7 @@ def out(work: Work, state: Table, given: Table, say: Say) -> Table:
     project = Project.of_table(state)
     found = work.fit(project)
     sources = work.read(project)
+    aside = set_aside([Path(REPORT) / "robot.toml"])
     with Output(Path(REPORT), ["robot.toml"], work.inputs, True).draft() as draft:
         save_robot(found, draft / "robot.toml", work.inputs, project.calibration.robot)
     files = [_file(f"{REPORT}/robot.toml", "the calibrated machine")]
@@ -230,6 +249,7 @@ def out(work: Work, state: Table, given: Table, say: Say) -> Table:
         try:
             if Path(name).resolve() in inputs:
                 raise ArgumentError(f"{name} is an input: give your file another name")
+            aside += set_aside([Path(name)])
             said = str(exporting.run(job, Inputs(), force=True))
             file = _file("" if Path(name).is_dir() else name, f"{name}: {said}")
             files.append({**file, "target": asked.get(job.out)})
@@ -242,7 +262,7 @@ def out(work: Work, state: Table, given: Table, say: Say) -> Table:
             changed += difflib.unified_diff(old, new, job.config, name, n=1, lineterm="")
     there = (*project.targets, own)
     others = [(each.name, each.label) for each in offered(robot) if each.name not in there]
-    return {"files": files, "changed": changed, "targets": others,
+    return {"files": files, "changed": changed, "targets": others, "said": aside,
             "certificate": telling.stated(Path("certificate.toml")),
             "commands": [quoted(job.argv()) for job in exports]}  # fmt: skip
 
@@ -284,13 +304,14 @@ def crash(work: Work, state: Table, given: Table, say: Say) -> Table:
 
 
 OPERATIONS: dict[str, Callable[[Work, Table, Table, Say], Table]] = {
-    each.__name__: each for each in (take, machine, plan, look, fit, out, report, wait, crash)
+    each.__name__: each
+    for each in (take, machine, plan, look, devices, fit, out, report, wait, crash)
 }
 
 
 def told(error: BaseException) -> Table:
     """Return an error's words, and the file and line that they begin with."""
-    found: Table = {"message": str(error)}
+    found: Table = {"message": of_system(error) if isinstance(error, OSError) else str(error)}
     place = re.match(r"(?:.*/)?([^/:]+), line (\d+)\b", found["message"])
     return {**found, "file": place[1], "line": int(place[2])} if place else found
 

@@ -42,7 +42,3 @@ def _answer(work: Work, asked: dict[str, Any], answers: IO[str]) -> None:
         send({"error": {"message": f"a mistake in pkmcal: {error!r}", "fault": True}})
     else:
         send({"result": result})
-
-
-if __name__ == "__main__":
-    main()

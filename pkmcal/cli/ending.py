@@ -15,7 +15,7 @@ from typing import Any, TextIO
 
 from pkmcal.cli import interrupt
 from pkmcal.display import printable
-from pkmcal.exceptions import Error
+from pkmcal.exceptions import Error, of_system
 
 DONE, NOT_TRUSTED, REFUSED, MISTAKE = 0, 1, 2, 3
 _LONGEST = 1000  # letters of a message: names of others may be in it
@@ -51,7 +51,7 @@ def _reason(error: BaseException) -> tuple[str, int]:
     if isinstance(error, MemoryError):
         return "not enough memory for what was given", REFUSED
     if isinstance(error, OSError):
-        return _of_system(error), REFUSED
+        return of_system(error), REFUSED
     if isinstance(error, Error):
         return str(error), REFUSED
     if hasattr(error, "format_message"):  # typer's, of the command line
@@ -73,12 +73,6 @@ def warned(
 
 def _one_line(message: str) -> str:
     return printable(" ".join(message.split()), _LONGEST)
-
-
-def _of_system(error: OSError) -> str:
-    if error.strerror and error.filename:
-        return f"{error.filename}: {error.strerror}"
-    return str(error)
 
 
 def _of_command_line(error: Any) -> str:

@@ -137,6 +137,24 @@ def plan(
         ),
     ] = None,
     seed: Seed = 0,
+    gcode: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FIRMWARE",
+            help="Beside these a program that drives from pose to pose: of klipper, reprap, marlin"
+            " or linuxcnc. All ways were looked at; nothing knows what stands in them.",
+        ),
+    ] = None,
+    dwell: Annotated[
+        float, typer.Option(metavar="S", help="How long that waits at each pose.")
+    ] = 5.0,
+    safe_height: Annotated[
+        float | None,
+        typer.Option(
+            metavar="Z",
+            help="To what height it rises between poses, mm; of a probe 5, else straight.",
+        ),
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -166,7 +184,7 @@ def carried_out(job: Planning, out: Path | None, force: bool, json: bool) -> int
     written: list[Path] = []
     if output is not None:
         with output.draft() as draft:
-            planning.write(made, draft, read.comment())
+            planning.write(job, made, draft, read.comment())
         written = output.paths
     if json:
         say(as_json(made, schema="plan"))

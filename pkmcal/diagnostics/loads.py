@@ -17,7 +17,7 @@ from pkmcal.fitted.fit import Fit
 from pkmcal.fitted.solution import Solution
 from pkmcal.geometry.carried import Load
 from pkmcal.geometry.elastic import COMPLIANCE, PER_LENGTH
-from pkmcal.kinematics.calibratable import ArmMachine, Calibratable
+from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.readings.predicted import Predicted
 from pkmcal.statistics.distributions import t_tail
 from pkmcal.statistics.score_test import Columns, score_test
@@ -61,7 +61,7 @@ def _followed(found: Solution) -> tuple[FollowedLoads, ...]:
 
 def _of_loads(robot: Calibratable) -> Elasticity:
     """Name what follows loads first in a machine: legs and screws, or joints of an arm."""
-    return _OF_JOINTS if isinstance(robot, ArmMachine) else _OF_LEGS
+    return _OF_JOINTS if robot.kind == "arm" else _OF_LEGS
 
 
 def _by_compliances(fit: Fit, robot: Calibratable) -> Columns:

@@ -92,11 +92,16 @@ def sealed(content: bytes, kind: str) -> bytes:
     1
     <BLANKLINE>
     """
-    if kind not in _FORMS:
+    if not has_seals(kind):
         return content
     form = _FORMS[kind]
     at = form.place(len(content))
     return content[:at] + form.written(hashlib.sha256(content).hexdigest()) + content[at:]
+
+
+def has_seals(kind: str) -> bool:
+    """Return whether files of a kind, such as ".csv", have a seal."""
+    return kind in _FORMS
 
 
 def is_sealed(content: bytes, kind: str) -> bool:
@@ -108,7 +113,7 @@ def is_sealed(content: bytes, kind: str) -> bool:
     >>> is_sealed(written, ".csv"), is_sealed(written + b"2\n", ".csv")
     (True, False)
     """
-    if kind not in _FORMS:
+    if not has_seals(kind):
         return False
     form = _FORMS[kind]
     size = len(form.written("0" * 64))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 from pkmcal.arrays import Unit
 from pkmcal.exceptions import ArgumentError
@@ -156,6 +157,7 @@ def require_compliance(what: str, value: float, stiffness: str, per_stiffness: f
         )
 
 
+@cache
 def is_kinematic(name: str) -> bool:
     """Return whether a number is one of a limb, or ties some; not of loads or compliances."""
     return not is_elastic(name) and not is_of_load(name)

@@ -38,13 +38,18 @@ def write(job: Importing, printer: Printer, inputs: Inputs, force: bool) -> list
         A file that would be lost.
     """
     measured = tables(printer)
-    output = Output(Path(job.out), ["robot.toml", *measured], inputs, force)
+    output = Output(Path(job.out), files(printer), inputs, force)
     with output.draft() as draft:
         (draft / "robot.toml").write_bytes((inputs.comment() + printer.text).encode())
         for name, each in measured.items():
             units = reading_units(printer.robot)
             write_measurements(each, draft / name, inputs.comment(), units)
     return output.paths
+
+
+def files(printer: Printer) -> list[str]:
+    """Names of the files that are written: the robot file first."""
+    return ["robot.toml", *tables(printer)]
 
 
 def tables(printer: Printer) -> dict[str, Measurements]:

@@ -8,6 +8,8 @@ from pkmcal.jobs.machine import OfMachine
 from pkmcal.jobs.reading import is_file
 from pkmcal.jobs.stated import PathText, below, command
 
+GCODE = ("klipper", "reprap", "marlin", "linuxcnc")  # firmwares that a plan is written for
+
 
 @dataclass(frozen=True)
 class Planning(OfMachine):
@@ -49,6 +51,9 @@ class Planning(OfMachine):
     unknown: tuple[str, ...] = ()
     within: tuple[str, ...] = ()
     seed: int = 0
+    gcode: str | None = None
+    dwell: float = 5.0
+    safe_height: float | None = None
 
     def argv(self) -> list[str]:
         """The command line that says the same, without what is written."""

@@ -22,6 +22,7 @@ from pkmcal.jobs.geometry_options import free_names, read_prior
 from pkmcal.jobs.inputs import Inputs
 from pkmcal.jobs.load_options import mass, yielding
 from pkmcal.jobs.plan import Planning
+from pkmcal.jobs.plan_gcode import PROBE, firmware_of, program
 from pkmcal.jobs.planned_camera import planned_camera
 from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.kinematics.reading_units import reading_units
@@ -39,7 +40,6 @@ from pkmcal.planning.plan_poses import Plan, plan_poses
 from pkmcal.planning.planned import UNKNOWN
 from pkmcal.readings.registry import Kind
 
-PROBE = "probe"  # of a printer: heights, on its bed
 _RINGS = 8  # of places on the bed
 DRAWN, _SHARE = 500, 0.9  # candidates where none are given, and how far out they reach
 
@@ -180,7 +180,8 @@ def files(job: Planning) -> list[str]:
     kinds = kinds_of(job)
     several = isinstance(kinds, dict)
     commands = [f"commands-{each}.csv" for each in kinds] if several else ["commands.csv"]
-    return ["poses.csv", *commands]
+    program = [] if job.gcode is None else [f"poses.{firmware_of(job).ending}"]
+    return ["poses.csv", *commands, *program]
 
 
 def kinds_of(job: Planning) -> Kind | dict[Kind, int]:
@@ -346,8 +347,17 @@ def _places(machine: Robot | SerialArm, path: PathLike[str]) -> FloatArray:
     return read_poses(path, machine)
 
 
-def write(made: Plan, out: Path, head: str) -> None:
-    """Write the files of a plan."""
+def write(job: Planning, made: Plan, out: Path, head: str) -> None:
+    """Write the files of a plan.
+
+    Raises
+    ------
+    ValueError
+        G-code of another machine than its firmware moves, or a way that leaves the limits.
+    """
+    if job.gcode is not None:
+        name = f"poses.{firmware_of(job).ending}"
+        (out / name).write_bytes(program(job, made, head).encode())
     kinds = list(dict.fromkeys(made.kinds))
     several = {"kind": made.kinds} if len(kinds) > 1 else {}
     carried = {} if made.load is None else {"payload [kg]": np.asarray(made.load.mass)}

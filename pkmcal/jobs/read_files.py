@@ -25,6 +25,7 @@ from pkmcal.readings.camera import Camera, Mount
 from pkmcal.readings.lens import Found
 
 COLUMNS = ("header", "ignore", "rename", "units", "rotation")  # keys of a file of --columns
+_DIGITS = 19  # that no number of a row has
 
 
 def read_files(
@@ -137,12 +138,12 @@ def rows_to_drop(given: Sequence[str], measured: Sequence[Measurements]) -> list
     """
     rows: list[int] = []
     for text in (part.strip() for each in given for part in each.split(",")):
-        if text.isdecimal():
+        if _is_count(text):
             rows.append(int(text))
             continue
         file, colon, line = text.rpartition(":")
-        if not colon or not line.isdecimal():
-            raise ArgumentError(f"--drop {text}: expected the number of a row, or FILE:LINE")
+        if not colon or not _is_count(line):
+            raise ArgumentError(f"--drop {text:.80}: expected the number of a row, or FILE:LINE")
         first, found = 0, list[int]()
         for each in measured:
             if each.lines is not None and Path(each.file).name == Path(file).name:
@@ -152,6 +153,10 @@ def rows_to_drop(given: Sequence[str], measured: Sequence[Measurements]) -> list
             raise ArgumentError(f"--drop {text}: no row was read from there")
         rows += found
     return rows
+
+
+def _is_count(text: str) -> bool:
+    return text.isdecimal() and len(text) < _DIGITS
 
 
 def without_lines(
@@ -169,7 +174,7 @@ def without_lines(
     for text in (part.strip() for each in given for part in each.split(",")):
         file, _, line = text.rpartition(":")
         own = Path(file).name == Path(held.file).name and Path(file).name not in names
-        if own and line.isdecimal() and held.lines is not None and int(line) in held.lines:
+        if own and _is_count(line) and held.lines is not None and int(line) in held.lines:
             lines.add(int(line))
         else:
             others.append(text)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,10 +16,19 @@ from pkmcal.measurements.sigma import deviations
 _LISTED_ROWS = 12  # a longer list of measurements is printed with its middle left out
 
 
-def table(m: Any) -> Table:
-    """The rows, of many the first and the last."""
+def table(m: Any, units: Sequence[str] | None = None) -> Table:
+    """The rows, of many the first and the last.
+
+    Parameters
+    ----------
+    m : Measurements
+        The rows.
+    units : sequence of str, optional
+        Of the actuators, as `reading_units` has them; those of the measurements by default, which
+        do not know of counts.
+    """
     heads, columns = ["row"], [[str(row) for row in range(len(m))]]
-    for column, sigma in _columns(m):
+    for column, sigma in _columns(m, units):
         shown = display.displayed(0.0, column.unit)[1]
         heads.append(column._replace(unit=shown).heading)
         columns.append(_cells(column, sigma))
@@ -37,9 +46,9 @@ def title(m: Any) -> str:
                       *filter(None, said)])  # fmt: skip
 
 
-def _columns(m: Any) -> Iterator[tuple[WrittenColumn, float | None]]:
+def _columns(m: Any, units: Sequence[str] | None) -> Iterator[tuple[WrittenColumn, float | None]]:
     """Columns, with the least deviation of those that have one."""
-    units = m.actuator_units or ("",) * m.actuators.shape[1]
+    units = units or m.actuator_units or ("",) * m.actuators.shape[1]
     for column in numbered("", units, m.actuators):
         yield column._replace(name=column.name[1:]), None
     for column in m.instrument.columns(units):

@@ -31,7 +31,7 @@ def health(served: browser.Served) -> dict[str, int]:
     return found
 
 
-def gone(pid: int, seconds: float = 5.0) -> bool:
+def gone(pid: int, seconds: float = 20.0) -> bool:
     end = time.monotonic() + seconds
     while Path(f"/proc/{pid}").exists() and time.monotonic() < end:
         time.sleep(0.02)

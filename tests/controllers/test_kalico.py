@@ -14,6 +14,9 @@ import pytest
 
 import pkmcal as pk
 from pkmcal.controllers.printer_config import read
+from pkmcal.jobs import planning
+from pkmcal.jobs.inputs import Inputs
+from pkmcal.jobs.plan import Planning
 
 from .test_klipper_rotary import ROTARY
 
@@ -185,3 +188,26 @@ def test_firmware_fits_the_same_heights_as_well(tmp_path: Path) -> None:
     ours = np.sqrt(np.mean((z - values) ** 2))
     assert ours <= theirs + 1e-5
     assert theirs - ours < 2e-3
+
+
+@pytest.mark.parametrize("kind", ["position", "probe"])
+def test_firmware_drives_to_the_poses_of_a_plan(tmp_path: Path, kind: str) -> None:
+    """The program of `pkmcal plan --gcode klipper`, nothing in it refused."""
+    config = tmp_path / "printer.cfg"
+    probe = "\n[probe]\npin: gpiochip0/gpio30\nz_offset: 0\n"
+    config.write_text(CONFIG.read_text() + probe * ("[probe]" not in CONFIG.read_text()))
+    (tmp_path / "robot.toml").write_text(pk.import_printer(CONFIG).text)
+    lower = ("z=0:280",)  # above, the firmware allows less than its radius
+    job = Planning(str(tmp_path / "robot.toml"), count=12, kind=kind, gcode="klipper", dwell=0.2,
+                   within=lower)  # fmt: skip
+    made = planning.run(job, Inputs())
+    planning.write(job, made, tmp_path, "")
+    program = (tmp_path / "poses.gcode").read_text()
+    stop = "PROBE" if kind == "probe" else "G4 P200"
+    log = log_of(config, program.replace(f"{stop}\n", f"{stop}\nGET_POSITION\n"))
+    refused = [line for line in log.splitlines() if "!!" in line or "Unknown command" in line]
+    assert not refused, refused
+    there = np.array([numbers(line) for line in re.findall(r"toolhead: (.*)", log)])
+    # a probe ends at a whole step, and where its pin says, which is none here
+    axes, step = (2, 0.02) if kind == "probe" else (3, 2e-5)
+    np.testing.assert_allclose(there[:, :axes], made.poses[:, :axes], rtol=0, atol=step)

@@ -3,9 +3,12 @@ import * as server from './transport.js'
 import { STEPS, app, attempt, change, frame, go, made, refresh, said, trouble, work } from './frame.js'
 
 // each screen is fetched when it is first shown
-for (const [step] of STEPS) app.screens[step] = async main => (await import(`./${step}.js`))[step](main)
+for (const { dataset: { step } } of STEPS) app.screens[step] = async main => (await import(`./${step}.js`))[step](main)
 window.workbench = app // what tests ask
 addEventListener('unhandledrejection', event => trouble(event.reason?.message ?? String(event.reason)))
+
+const stepOf = hash => STEPS.find(one => `#${one.dataset.step}` === hash)?.dataset.step
+addEventListener('popstate', () => app.project && go(stepOf(location.hash) ?? 'machine', true, true))
 
 // a file that misses its place must not take the page's
 addEventListener('dragover', event => { event.preventDefault(); document.body.classList.add('over') })
@@ -20,7 +23,9 @@ attempt(async () => {
   app.project = await server.state()
   frame()
   if (app.project.trouble) trouble(app.project.trouble)
-  await go(app.project.commands.result.length ? 'result' : 'machine', false)
+  const first = stepOf(location.hash) ?? (app.project.commands.result.length ? 'result' : 'machine')
+  history.replaceState(null, '', `#${first}`)
+  await go(first, false)
   document.body.dataset.ready = ''
   for await (const message of server.changes()) {
     if (message.changed === app.project.version) continue

@@ -1,7 +1,7 @@
 // What is around the screens: the steps, what is wrong, what is running, the lines for a terminal.
 import * as server from './transport.js'
 
-export const STEPS = [['machine', 'Machine'], ['plan', 'Plan'], ['measure', 'Measure'], ['result', 'Result'], ['out', 'Take away']]
+export const STEPS = [...document.querySelectorAll('#steps button')] // painted before anything is asked
 export const app = { step: 'machine', project: null, screens: {}, picture: null, times: {} }
 const $ = id => document.getElementById(id)
 
@@ -125,12 +125,8 @@ async function changing(edit) {
   const table = structuredClone(app.project.state)
   edit(table)
   for (const [name, part] of Object.entries(table)) if (part && typeof part === 'object' && !Object.keys(part).length) delete table[name]
-  return taken(await server.change(table, app.project.version))
-}
-
-export async function undo() {
-  said([])
-  if (await taken(await server.undo(app.project.version))) await refresh()
+  const back = async error => { await refresh(); throw error } // what was ticked or typed is not so
+  return taken(await server.change(table, app.project.version).catch(back))
 }
 
 async function taken(answer) {
@@ -149,24 +145,30 @@ const ready = {
 
 export function frame() {
   const { project } = app
-  if (!$('steps').children.length) STEPS.forEach(([step, text], k) => button(made('li', $('steps')), `${k + 1} ${text}`, () => go(step)))
-  STEPS.forEach(([step], k) => {
-    const one = $('steps').children[k].firstElementChild
+  document.title = `${project.folder.split(/[\\/]/).pop()} – pkmcal`
+  for (const one of STEPS) {
+    const { step } = one.dataset
+    one.onclick = () => attempt(() => go(step))
     if (step === app.step) one.setAttribute('aria-current', 'step')
     else one.removeAttribute('aria-current')
     one.disabled = !ready[step](project)
-  })
+  }
   $('undo').hidden = !project.undo
-  $('undo').onclick = () => attempt(undo)
+  $('undo').onclick = () => attempt(async () => {
+    said([])
+    if (await taken(await server.undo(app.project.version))) await refresh()
+  })
   const lines = project.commands[app.step] ?? []
   $('terminal').hidden = !lines.length
   $('terminal').querySelector('pre').textContent = [project.enter, ...lines].join('\n')
   $('terminal').querySelector('button').onclick = () => attempt(() => navigator.clipboard.writeText($('terminal').querySelector('pre').textContent))
 }
 
-export async function go(step, focus = true) {
+// Show a screen; the browser's way back leads to the one before, and a reload shows it again.
+export async function go(step, focus = true, keep = false) {
   if (!ready[step](app.project)) step = 'machine' // as after undo
   if (step !== app.step) said([])
+  if (!keep && `#${step}` !== location.hash) history.pushState(null, '', `#${step}`)
   app.step = step
   app.refresh = null
   app.picture?.machine?.dispose?.()

@@ -4,8 +4,8 @@ import { app, field, made, attempt } from './frame.js'
 export function numbers(parent, found, before, refit) {
   const wide = made('div', parent, { className: 'wide', tabindex: 0, role: 'region', 'aria-label': 'numbers' })
   const table = made('table', wide)
-  made('caption', table, { text: 'Numbers that are found; ± is one standard deviation' })
-  made('tr', table, {}, ...['find', 'number', 'value', '±', 'change', 'unit', 'knowledge'].map(text => made('th', null, { text, scope: 'col' })))
+  made('caption', table, { text: found.of_numbers.caption })
+  made('tr', table, {}, ...found.of_numbers.heads.map(text => made('th', null, { text, scope: 'col' })))
   const free = () => app.project.state.fit?.free ?? ['default']
   const fix = () => app.project.state.fit?.fix ?? []
   const box = (cell, name, checked, changed) => {

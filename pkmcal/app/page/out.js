@@ -1,5 +1,5 @@
 // What is taken away: the changed configuration, the calibrated machine, the report.
-import { again, app, attempt, button, change, choice, field, frame, made, refresh, work } from './frame.js'
+import { again, app, attempt, button, change, choice, field, frame, made, refresh, said, work } from './frame.js'
 import { save } from './transport.js'
 
 export async function out(main) {
@@ -30,6 +30,7 @@ export async function out(main) {
     again(lines, () => changes(lines, found.changed))
     const targets = app.project.state.export?.as ?? []
     const set = async now => { await change(table => { if (now.length) table.export = { as: now }; else delete table.export }) && await refresh() }
+    said(found.said)
     again(list, () => found.files.forEach(one => {
       const item = offer(list, one)
       if (one.target) button(item, `remove ${one.target}`, () => set(targets.filter(name => name !== one.target)))

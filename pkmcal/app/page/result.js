@@ -38,7 +38,7 @@ export async function result(main) {
     else selected(key)
     again(picked, () => {
       const row = app.found.rows.find(one => one.key === key)
-      if (row) made('label', picked, { className: 'tick' }, use(row, refit, 'picked'), made('span', null, { text: `use ${row.name}: ${short(row.before)} → ${short(row.after)} mm ${row.said}` }))
+      if (row) made('label', picked, { className: 'tick' }, use(row, refit, 'picked'), made('span', null, { text: `use ${row.name}: ${row.off.join(' → ')} mm ${row.said}` }))
     })
   }
 
@@ -84,8 +84,6 @@ function held(parent, refit) {
   choice(parent, 'outliers', [['', 'count in full'], ['huber', 'count less'], ['cauchy', 'hardly count']], fit.loss ?? '', value => set('loss', value))
 }
 
-const short = x => (x === null || x === undefined ? '–' : Math.abs(x) >= 1000 ? x.toFixed(0) : Number(x.toPrecision(3)).toString())
-
 // A box that leaves a row out, or takes it back, by its number: a line may have several.
 function use(each, refit, where = '') {
   const box = made('input', null, { type: 'checkbox', 'aria-label': `use ${each.name}`, 'data-key': `${where}use ${each.key}` })
@@ -116,15 +114,15 @@ function rows(parent, found, list, refit, name) {
   list.order = sorted.map(({ key }) => key)
   const wide = made('div', parent, { className: 'wide', tabindex: 0, role: 'region', 'aria-label': 'measured rows' })
   const table = made('table', wide)
-  made('caption', table, { text: 'Measured rows: the distance from where the machine is, mm' })
-  made('tr', table, {}, ...['use', 'row', 'before', 'after', 'remark'].map(text => made('th', null, { text, scope: 'col' })))
+  made('caption', table, { text: found.of_rows.caption })
+  made('tr', table, {}, ...found.of_rows.heads.map(text => made('th', null, { text, scope: 'col' })))
   for (const each of shown) {
     const line = made('tr', table, { className: each.use ? 'out' : each.said ? 'odd' : '', id: `row ${each.key}` })
     if (list.named === each.key) line.classList.add('named')
     made('td', line, {}, use(each, refit))
     const show = button(made('td', line), each.name, () => name(each.key, 'list'), { className: 'plain', 'aria-label': `show ${each.name}` })
     line.onclick = event => { if (event.target !== show) name(each.key, 'list') }
-    for (const text of [short(each.before), short(each.after), each.said]) made('td', line, { text })
+    for (const text of [...each.off, each.said]) made('td', line, { text })
   }
   if (moved) button(parent, 'sort, worst first', () => { list.order = []; again(parent, () => rows(parent, found, list, refit, name)) })
   if (shown.length < sorted.length) button(parent, `show all ${sorted.length} rows`, () => { list.all = true; again(parent, () => rows(parent, found, list, refit, name)) })
