@@ -197,7 +197,7 @@ def calls() -> list[Call]:
                 ((), (3,), (3,), (3, 3), (), (3,), (3,)), {"own": "either", "frame": "either"}),
         formula("strand", "straight parts of cables: their lengths, by the end and twice by it",
                 pulleys.strand, "joint length by_joint bend", ((), (3,), (3, 3))),
-        *(_work_at_anchor(driver) for driver in (limbs.SLIDER, limbs.CRANK)),
+        *(_work_at_anchor(driver) for driver in limbs.DRIVERS if driver.moves),
         formula("tpr2tps_lengths", "2TPR&2TPS: eq. 8", tpr2tps.lengths, "size free lengths",
                 ((4,),), {"size": "shared"}),
         formula("tpr2tps_jacobian", "2TPR&2TPS: eq. 12", tpr2tps.by_free, "size free jacobian",

@@ -9,10 +9,7 @@ from .limbs import (
     AXES,
     CONSTANTS,
     CONSTRAINTS,
-    CRANK,
     DRIVERS,
-    LENGTH,
-    SLIDER,
     Axis,
     Constraint,
     Driver,
@@ -76,21 +73,15 @@ def _anchor(driver: Driver) -> Function:
     )
     qt = f.scalar("qt", "q̃ [mm or rad]")
     f.numbers()
-    moved = directed(f, driver, qt)
+    first, second = directions(f)
+    moved = driver.moved(qt, first, second, lambda angle: f.sincos("q", angle))
     f.output("c", f.base + moved if driver.moves else f.base, "anchor [mm]")
     return f
 
 
-def directed(f: Function, driver: Driver, qt: sp.Expr) -> sp.Matrix:
-    """From the base point to the anchor, by the prepared directions, which are declared."""
-    first = f.vector("first", 3, "s, or crank e")
-    second = f.vector("second", 3, "0, or crank axis × e")
-    if driver is SLIDER:
-        return qt * first
-    if driver is CRANK:
-        sq, cq = f.sincos("q", qt)
-        return cq * first + sq * second
-    return sp.zeros(3, 1)
+def directions(f: Function) -> tuple[sp.Matrix, sp.Matrix]:
+    """Declare the two directions in which an anchor moves, as `_prepare` has them."""
+    return f.vector("first", 3, "s, or crank e"), f.vector("second", 3, "0, or crank axis × e")
 
 
 def _radius(driver: Driver) -> Function:
@@ -130,12 +121,7 @@ def _prepare(driver: Driver) -> Function:
         driver.formula,
     )
     f.numbers()
-    axes, nothing = f.base_axes(), sp.zeros(3, 1)
-    first, second = {
-        LENGTH: (nothing, nothing),
-        SLIDER: (axes.col(2), nothing),
-        CRANK: (f.g["crank"] * axes.col(0), f.g["crank"] * axes.col(1)),
-    }[driver]
+    first, second = driver.directions(f, f.base_axes())
     f.output("first", first, "s, or crank e")
     f.output("second", second, "0, or crank axis × e")
     return f
@@ -143,40 +129,16 @@ def _prepare(driver: Driver) -> Function:
 
 def _inverse(driver: Driver) -> Function:
     """q̃ from the joint h = p + R b - base in closed form; NaN where the limb cannot reach."""
-    formulas = {
-        LENGTH: "q̃ = ‖h‖",
-        SLIDER: "q̃ = h·s - branch √(rod² - ‖h - (h·s) s‖²)",
-        CRANK: "h·(cos q̃ e + sin q̃ n) = κ = (h·h + crank² - rod²)/(2 crank)\n"
-        "q̃ = atan2(h·n, h·e) - branch atan2(√((h·e)² + (h·n)² - κ²), κ)",
-    }
     f = LimbFunction(
         f"{driver.name}_inverse",
         f"{driver.name}: actuator coordinate at a joint position",
-        formulas[driver],
+        driver.inverse_formula,
     )
     f.numbers()
     h = f.vector("h", 3, "p + R b - base [mm]")
-    first = f.vector("first", 3, "s, or crank e")
-    second = f.vector("second", 3, "0, or crank axis × e")
+    first, second = directions(f)
     branch = f.scalar("branch", "sign of d·∂c/∂q̃, where there are two")
-    if driver is LENGTH:
-        f.output("qt", sp.sqrt(h.dot(h)), "q̃ [mm]")
-        return f
-    if driver is SLIDER:
-        along = f.let("along", h.dot(first))
-        across = f.let("across", h - along * first)
-        root = f.let("root", sp.sqrt(f.g["rod"] ** 2 - across.dot(across)))
-        f.output("qt", along - branch * root, "q̃ [mm]")
-        return f
-    # both sides times the crank's length, which scales the two atan2 arguments alike
-    x, y = f.let("x", h.dot(first)), f.let("y", h.dot(second))
-    twice = f.let("twice", h.dot(h) + f.g["crank"] ** 2 - f.g["rod"] ** 2)
-    kappa = f.let("kappa", twice / 2)
-    root = f.let("root", sp.sqrt(x**2 + y**2 - kappa**2))
-    side = f.let("side", branch * root)
-    sine = f.let("sine", y * kappa - x * side, "of q̃, up to a positive factor")
-    cosine = f.let("cosine", x * kappa + y * side)
-    f.output("qt", f.angle("turn", sine, cosine), "q̃ [rad]")
+    f.output("qt", driver.inverse(f, h, first, second, branch), f"q̃ [{driver.unit}]")
     return f
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import sympy as sp
 
@@ -84,13 +85,46 @@ class LimbFunction(Function):
         return self.p + self.v + r + skew(self.omega) * r
 
 
-@dataclass(frozen=True)
+class SinCos(Protocol):
+    """Sine and cosine of an angle, as the function that is emitted has them."""
+
+    def __call__(self, angle: sp.Expr, /) -> tuple[sp.Expr, sp.Expr]:
+        """Return both."""
+
+
+@dataclass(frozen=True, eq=False)
 class Driver:
-    """How the actuator coordinate q̃ moves the anchor and sets the length."""
+    """How the actuator coordinate q̃ moves the anchor and sets the length, and back.
+
+    Nothing else in `derive/` or `csrc/` knows of a driver; one that is not whole is a TypeError.
+
+    Attributes
+    ----------
+    name, unit : str
+        In C, and of q̃: "mm" or "rad".
+    formula, inverse_formula : str
+        For the comments of what is emitted.
+    anchor : callable
+        Of the function that is emitted and q̃: anchor c and length ρ by the limb's numbers.
+    directions : callable
+        Of the same and the frame of the base axis: the two directions in which the anchor moves,
+        which depend on the numbers alone; 0 where it does not move.
+    moved : callable
+        Of q̃, the two directions, and `SinCos`: from the base point to the anchor. A test proves it
+        to be `anchor`.
+    inverse : callable
+        Of the function, h = p + R b - base, the two directions and the branch: q̃ in closed form,
+        NaN where the limb cannot reach.
+    """
 
     name: str
+    unit: str
     formula: str
+    inverse_formula: str
     anchor: Callable[[LimbFunction, sp.Expr], tuple[sp.Matrix, sp.Expr]]
+    directions: Callable[[LimbFunction, sp.Matrix], tuple[sp.Matrix, sp.Matrix]]
+    moved: Callable[[sp.Expr, sp.Matrix, sp.Matrix, SinCos], sp.Matrix]
+    inverse: Callable[[LimbFunction, sp.Matrix, sp.Matrix, sp.Matrix, sp.Expr], sp.Expr]
 
     @property
     def moves(self) -> bool:
@@ -119,6 +153,15 @@ def _slider(f: LimbFunction, qt: sp.Expr) -> tuple[sp.Matrix, sp.Expr]:
     return f.base + qt * s, f.g["rod"]
 
 
+def _on_slider(
+    f: LimbFunction, h: sp.Matrix, first: sp.Matrix, second: sp.Matrix, branch: sp.Expr
+) -> sp.Expr:
+    along = f.let("along", h.dot(first))
+    across = f.let("across", h - along * first)
+    root = f.let("root", sp.sqrt(f.g["rod"] ** 2 - across.dot(across)))
+    return along - branch * root
+
+
 def _crank(f: LimbFunction, qt: sp.Expr) -> tuple[sp.Matrix, sp.Expr]:
     axes = f.base_axes()
     e, n = f.let("e", axes.col(0), "crank at q̃ = 0"), f.let("n", axes.col(1), "and at q̃ = 90°")
@@ -126,9 +169,48 @@ def _crank(f: LimbFunction, qt: sp.Expr) -> tuple[sp.Matrix, sp.Expr]:
     return f.base + f.g["crank"] * (cq * e + sq * n), f.g["rod"]
 
 
-LENGTH = Driver("length", "c = base, ρ = q̃", _length)
-SLIDER = Driver("slider", "c = base + q̃ s, ρ = rod", _slider)
-CRANK = Driver("crank", "c = base + crank Rot(axis, q̃) e, ρ = rod", _crank)
+def _turned(qt: sp.Expr, first: sp.Matrix, second: sp.Matrix, sincos: SinCos) -> sp.Matrix:
+    sq, cq = sincos(qt)
+    return cq * first + sq * second
+
+
+def _on_crank(
+    f: LimbFunction, h: sp.Matrix, first: sp.Matrix, second: sp.Matrix, branch: sp.Expr
+) -> sp.Expr:
+    # both sides times the crank's length, which scales the two atan2 arguments alike
+    x, y = f.let("x", h.dot(first)), f.let("y", h.dot(second))
+    twice = f.let("twice", h.dot(h) + f.g["crank"] ** 2 - f.g["rod"] ** 2)
+    kappa = f.let("kappa", twice / 2)
+    root = f.let("root", sp.sqrt(x**2 + y**2 - kappa**2))
+    side = f.let("side", branch * root)
+    sine = f.let("sine", y * kappa - x * side, "of q̃, up to a positive factor")
+    cosine = f.let("cosine", x * kappa + y * side)
+    return f.angle("turn", sine, cosine)
+
+
+LENGTH = Driver(
+    "length", "mm", "c = base, ρ = q̃", "q̃ = ‖h‖",
+    _length,
+    lambda f, axes: (sp.zeros(3, 1), sp.zeros(3, 1)),
+    lambda qt, first, second, sincos: sp.zeros(3, 1),
+    lambda f, h, first, second, branch: sp.sqrt(h.dot(h)),
+)  # fmt: skip
+SLIDER = Driver(
+    "slider", "mm", "c = base + q̃ s, ρ = rod", "q̃ = h·s - branch √(rod² - ‖h - (h·s) s‖²)",
+    _slider,
+    lambda f, axes: (axes.col(2), sp.zeros(3, 1)),
+    lambda qt, first, second, sincos: qt * first,
+    _on_slider,
+)  # fmt: skip
+CRANK = Driver(
+    "crank", "rad", "c = base + crank Rot(axis, q̃) e, ρ = rod",
+    "h·(cos q̃ e + sin q̃ n) = κ = (h·h + crank² - rod²)/(2 crank)\n"
+    "q̃ = atan2(h·n, h·e) - branch atan2(√((h·e)² + (h·n)² - κ²), κ)",
+    _crank,
+    lambda f, axes: (f.g["crank"] * axes.col(0), f.g["crank"] * axes.col(1)),
+    _turned,
+    _on_crank,
+)  # fmt: skip
 DRIVERS = (LENGTH, SLIDER, CRANK)
 
 

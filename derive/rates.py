@@ -9,7 +9,8 @@ from __future__ import annotations
 import sympy as sp
 
 from .emit import Function
-from .limbs import CONSTRAINTS, CRANK, DRIVERS, LENGTH, Constraint, Driver
+from .limb_functions import directions
+from .limbs import CONSTRAINTS, DRIVERS, Constraint, Driver
 from .posemaps import MAPS, PoseMap, euler_rate_matrix, on_manifold, tangent
 from .rotation import skew
 
@@ -36,14 +37,14 @@ def _limb_path(
 ) -> tuple[sp.Matrix, sp.Expr]:
     """d(t) and ρ(t), up to a constant, of a limb whose joint and actuator move."""
     h = _path(f, "h", "p + R b - base [mm]")
-    first = f.vector("first", 3, "s, or crank e")
-    second = f.vector("second", 3, "0, or crank axis × e")
-    if driver is LENGTH:
-        return h, drive
-    if driver is not CRANK:
-        return h - drive * first, sp.S.Zero  # a rod's length stays
-    f.sincos("q", qt)
-    return h - sp.cos(drive) * first - sp.sin(drive) * second, sp.S.Zero
+    first, second = directions(f)
+
+    def sincos(angle: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
+        f.sincos("q", qt)  # those at the start are known
+        return sp.sin(angle), sp.cos(angle)
+
+    rho = drive if driver.stretches else sp.S.Zero  # a rod's length stays
+    return h - driver.moved(drive, first, second, sincos), rho
 
 
 def _joint_path(driver: Driver) -> Function:

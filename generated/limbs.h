@@ -1,5 +1,5 @@
 /* Generated from derive/limb_functions.py by `python -m derive`; never edited by hand.
- * derivation 8e9638ec801213d8
+ * derivation f423cc6f960bc3b5
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 /*

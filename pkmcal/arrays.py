@@ -25,7 +25,10 @@ Unit = Literal[
 ]  # fmt: skip
 
 _LONG = 8  # rows in a row that have a matrix in common, on the average, to be one product
-_ALIKE = 1e-6  # share by which entries of a direction differ that are not equal
+# By less, or a smaller share, numbers are equal of which the largest is chosen: rounding that
+# another processor or order of sums makes is up to some 1e-7 where they are differences, and no
+# choice may hang on it. The first of equal ones is taken.
+TIED = 1e-6
 
 
 def as_numbers(name: str, array: ArrayLike, last: str | int) -> NDArray[Any]:
@@ -138,7 +141,7 @@ def furthest_axis(direction: FloatArray) -> int:
     (0, 0)
     """
     along = np.abs(direction)
-    return first_largest(-along, _ALIKE * float(along.max()))
+    return first_largest(-along, TIED * float(along.max()))
 
 
 def lots(count: int, most: int = 16384) -> Iterator[slice]:
@@ -165,10 +168,11 @@ def chained(rows: FloatArray, matrices: FloatArray, place: IntArray) -> FloatArr
     `matrices` are (P, w, m), `place` (N,) which of them a row has. Where many rows in a row have
     one in common, as the corners of a picture, each is one product: copies would take most time.
     """
+    if len(place) == len(matrices) and (place == np.arange(len(place))).all():
+        return rows @ matrices
     starts = np.flatnonzero(np.diff(place, prepend=-1))
     if len(starts) * _LONG >= len(rows):
-        each = np.array_equal(place, np.arange(len(matrices)))
-        return rows @ (matrices if each else matrices[place])
+        return rows @ matrices[place]
     (_, k, w), m = rows.shape, matrices.shape[2]
     found = np.empty((len(rows), k, m))
     ends = [*starts[1:].tolist(), len(rows)]

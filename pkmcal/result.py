@@ -143,7 +143,9 @@ def failed_rows(
     most : int
         How many rows are listed of each status.
     """
-    parts = []
+    parts: list[str] = []
+    if not status.any():
+        return ""
     for code, words in meanings.items():
         rows = np.flatnonzero(status == code)
         if code and rows.size:

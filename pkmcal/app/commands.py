@@ -51,10 +51,10 @@ def export(target: str) -> Exporting:
 
 def offered(machine: Robot | SerialArm) -> list[Target]:
     """Return the targets that the window offers for a machine."""
-    from pkmcal.arms.arm import SerialArm  # the server shows commands without NumPy
+    from pkmcal.kinematics.calibratable import as_machine  # the server needs no NumPy for commands
 
-    takes = "arm" if isinstance(machine, SerialArm) else "parallel"
-    named = [each for each in targets().values() if each.label and each.takes in (takes, "any")]
+    takes = (as_machine(machine).kind, "any")
+    named = [each for each in targets().values() if each.label and each.takes in takes]
     return [each for each in named if not each.tried or _holds(each, machine)]
 
 

@@ -25,16 +25,17 @@ from starlette.routing import Route
 from pkmcal.app.commands import commands
 from pkmcal.app.folder import MOST_FILE, MOST_FOLDER, UPLOAD, Folder
 from pkmcal.app.guard import Application, Guard
+from pkmcal.app.live import Live
 from pkmcal.app.process import Message, Worker
 from pkmcal.exceptions import Error, of_system
 from pkmcal.jobs.plan import GCODE
 from pkmcal.jobs.stated import quoted
 from pkmcal.view import scripts
 
-OPERATIONS = ("take", "machine", "plan", "look", "fit", "out", "report")
+OPERATIONS = ("take", "machine", "plan", "look", "devices", "fit", "out", "report")
 FOR_TESTS = ("wait", "crash")
 PAGES = ("app.js", "frame.js", "transport.js", "picture.js", "machine.js", "plan.js",
-         "measure.js", "result.js", "numbers.js", "out.js")  # fmt: skip
+         "measure.js", "live.js", "result.js", "numbers.js", "out.js")  # fmt: skip
 _KINDS = {".css": "text/css", ".js": "text/javascript", ".html": "text/html"}
 _MOST_STATE = 1_000_000  # bytes
 _SILENT = 15.0  # s, after which a stream of events says that it is there
@@ -53,6 +54,7 @@ class Server:
         self._folder, self._worker, self._operations, self._door = folder, worker, operations, door
         self._listeners: set[asyncio.Queue[Message | None]] = set()
         self._running: dict[str, asyncio.Event] = {}
+        self._live = Live(folder)
 
     def application(self) -> Starlette:
         """Return the routes, without the guard."""
@@ -62,6 +64,7 @@ class Server:
             with self._door:  # uvicorn ends by the signal that it got: nothing after it runs
                 await self._worker.start()  # it imports while the page is opened
                 yield
+                await self._live.ended()
                 await self._worker.stop()
 
         return Starlette(
@@ -78,6 +81,7 @@ class Server:
                 Route("/api/file/{name:path}", self.upload, methods=["PUT"]),
                 Route("/api/run/{operation}", self.run, methods=["POST"]),
                 Route("/api/cancel/{job}", self.cancel, methods=["POST"]),
+                *self._live.routes(),
                 Route("/api/events", self.events),
                 Route("/api/download/{path:path}", self.download),
                 Route("/api/health", self.health),
@@ -253,7 +257,8 @@ class Server:
             self._listeners.discard(queue)
 
     def end(self) -> None:
-        """End what is streamed to pages: the server is about to end."""
+        """End what is streamed to pages, machines first: the server is about to end."""
+        self._live.stop()
         for queue in self._listeners:
             queue.put_nowait(None)
         for stopped in self._running.values():

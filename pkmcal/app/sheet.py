@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from pkmcal.arms.arm import SerialArm
-from pkmcal.core.library import POSE
 from pkmcal.display import displayed, fixed
+from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.planning.plan_poses import Plan
 from pkmcal.readings.registry import KINDS
 
@@ -20,12 +19,9 @@ def sheet(made: Plan) -> dict[str, Any]:
 
     Coordinates that are 0 at every pose are left out; of an arm it has joints.
     """
-    if isinstance(made.robot, SerialArm):
-        names = [f"q{i + 1}" for i in range(made.robot.n_joints)]
-        given = made.actuators
-        units: list[str] = list(made.robot.actuator_units)
-    else:
-        names, given, units = list(POSE), made.poses, ["mm"] * 3 + ["rad"] * 3
+    machine = as_machine(made.robot)
+    given = machine.as_commands(made.poses, made.actuators)
+    names, units = list(machine.commands), list(machine.commands.values())
     cells = [
         [fixed(displayed(float(value), unit)[0], _DECIMALS) for value in column]
         for column, unit in zip(given.T, units, strict=True)

@@ -39,6 +39,8 @@ from pkmcal.jobs.project import Project
 from pkmcal.jobs.stated import quoted
 from pkmcal.jobs.written import Written, save_robot
 from pkmcal.kinematics.calibratable import as_machine
+from pkmcal.live import registry
+from pkmcal.live.measuring_run import Rules
 from pkmcal.view import page
 
 Table = dict[str, Any]
@@ -201,6 +203,17 @@ def look(work: Work, state: Table, given: Table, say: Say) -> Table:
     }
 
 
+def devices(work: Work, state: Table, given: Table, say: Say) -> Table:
+    """Say which machines can be driven and which instruments read, with what addresses."""
+    rules = {name: value for name, value in vars(Rules()).items() if value is not None}
+    return {"machines": _addresses(registry.MACHINES), "rules": rules,
+            "instruments": _addresses(registry.INSTRUMENTS)}  # fmt: skip
+
+
+def _addresses(kinds: dict[str, Any]) -> list[tuple[str, str]]:
+    return [(word, kind.ADDRESS) for word, kind in kinds.items()]
+
+
 def fit(work: Work, state: Table, given: Table, say: Say) -> Table:
     """Calibrate: the verdict, the table, rows and numbers, the machine with its residuals."""
     project = Project.of_table(state)
@@ -291,7 +304,8 @@ def crash(work: Work, state: Table, given: Table, say: Say) -> Table:
 
 
 OPERATIONS: dict[str, Callable[[Work, Table, Table, Say], Table]] = {
-    each.__name__: each for each in (take, machine, plan, look, fit, out, report, wait, crash)
+    each.__name__: each
+    for each in (take, machine, plan, look, devices, fit, out, report, wait, crash)
 }
 
 

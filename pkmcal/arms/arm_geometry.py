@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 
@@ -29,6 +29,15 @@ class ArmGeometry:
     names: tuple[str, ...]
     units: tuple[str, ...]
     values: FloatArray
+
+    @property
+    def chain(self) -> FloatArray:
+        """Derivative (p, p) of the numbers by themselves: none is tied to another."""
+        return np.eye(len(self.values))
+
+    def items(self) -> Iterator[tuple[str, float]]:
+        """Name and value of each number."""
+        return zip(self.names, self.values.tolist(), strict=True)
 
     def match(self, patterns: str | Iterable[str], argument: str = "") -> list[str]:
         """Find names and wildcards, each name once, in the order of the patterns.

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal import arguments
-from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray, as_rows, propagate
 from pkmcal.calibration import summary
 from pkmcal.core import instruments
@@ -30,14 +29,14 @@ from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.fitted.held_numbers import considered_places
 from pkmcal.fitted.row_names import row_names
 from pkmcal.fitted.solution import Machine, Solution
-from pkmcal.kinematics.calibratable import as_machine
+from pkmcal.kinematics.calibratable import as_machine, as_parallel
 from pkmcal.result import Result
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _STRONG = 0.95  # correlation worth a word
-_ALIKE = 9  # decimals to which correlations differ that are not equal
+_TIED_DECIMALS = 9  # decimals to which correlations differ that are not equal
 _UNIDENTIFIABLE = 1e-3  # mm a pose moves per mm along an unidentifiable combination
 
 
@@ -106,10 +105,11 @@ class Identification(Solution[Machine], Result):
 
         Nothing is said of kinds with a prior, or that the measurements do not determine.
         """
-        if isinstance(self.robot, SerialArm):
+        robot = as_parallel(self.fit.parameters.robot)
+        if robot is None:
             return ()
         prior = np.asarray(self.fit.estimate.prior.any(axis=0))[self.columns]
-        return law_tests(self.robot.geometry, self, self.fit.uncertainty, prior)
+        return law_tests(robot.geometry, self, self.fit.uncertainty, prior)
 
     @property
     def parameters(self) -> dict[str, dict[str, float]]:
@@ -131,7 +131,7 @@ class Identification(Solution[Machine], Result):
             (self.free[i], self.free[j], float(matrix[i, j]))
             for i, j in zip(first, second, strict=True)
         ]
-        return tuple(sorted(pairs, key=lambda pair: -round(abs(pair[2]), _ALIKE)))
+        return tuple(sorted(pairs, key=lambda pair: -round(abs(pair[2]), _TIED_DECIMALS)))
 
     def _columns(self) -> dict[str, Any]:
         """The parameters: value, deviation and change of each."""
@@ -310,7 +310,7 @@ class Identification(Solution[Machine], Result):
         yield summary.misfit_table(self)
         yield summary.quality(self)
         datasets, chosen = self.fit.equations.prediction.datasets, self.fit.parameters
-        framed = len(self.free) > len(chosen.places) or isinstance(self.robot, SerialArm)
+        framed = len(self.free) > len(chosen.places) or chosen.robot.kind == "arm"
         if self.datum.names:
             yield summary.filled("", str(self.datum))
         yield from summary.limits(

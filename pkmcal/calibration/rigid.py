@@ -9,7 +9,8 @@ from pkmcal.estimation.begin import begun, estimator_at
 from pkmcal.estimation.free_parameters import parameters
 from pkmcal.fitted.left_out import Comparison, compared_by_poses
 from pkmcal.fitted.solution import Solution
-from pkmcal.kinematics.calibratable import ArmMachine, as_given
+from pkmcal.kinematics.arm_machine import ArmMachine
+from pkmcal.kinematics.calibratable import as_given
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,7 @@ from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.free_parameters import parameters
 from pkmcal.estimation.loss import LossName
+from pkmcal.estimation.own_classes import require_true
 from pkmcal.estimation.parameters import Asked, Parameters
 from pkmcal.estimation.pose_minima import solved_in_least_minima
 from pkmcal.estimation.starts import known_distances
@@ -128,6 +129,7 @@ def begin(rows: Rows, chosen: Parameters) -> Problem:
     if rows.held and problem.equations.machines.cells:
         raise ArgumentError("holdout: rows whose tensions are unknown are all fitted: leave it out")
     _require_predictions(problem)
+    require_true(problem.exact.prediction, problem.start)
     return problem
 
 
@@ -166,6 +168,7 @@ def solve(problem: Problem, loss: LossName, rule: CovarianceRule) -> Fit:
     estimate = solved_in_least_minima(estimator)
     if failed := problem.equations.failures(estimate.evaluation):
         raise ArgumentError(f"{failed} where the search ended")
+    require_true(problem.equations.prediction, estimate.evaluation)
     return Fit(problem, estimator, estimate, rule=rule)
 
 

@@ -32,7 +32,6 @@ from pkmcal.jobs.calibration import Calibration, Writing
 from pkmcal.jobs.inputs import Inputs
 from pkmcal.jobs.project import Project
 from pkmcal.jobs.written import Written
-from pkmcal.kinematics.robot import Robot
 from pkmcal.report.as_json import as_json
 
 UNKNOWN = "What is unknown besides"
@@ -327,9 +326,10 @@ def _say_written(written: Written, found: Identification, rigid: object) -> None
     if report is not None:
         say(f"\nreport: {report.paths[0]}")
     first = report or machine
-    if first is not None and isinstance(found.robot, Robot) and found.robot.model.controller:
+    controller = found.fit.parameters.robot.model.controller
+    if first is not None and controller is not None:
         robot_file = next(path for path in first.paths if path.name == "robot.toml")
-        say(f"for its firmware: {found.robot.model.controller.command(str(robot_file))}")
+        say(f"for its firmware: {controller.command(str(robot_file))}")
 
 
 def _printed(written: Written, json: bool) -> bool:

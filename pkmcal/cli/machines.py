@@ -9,7 +9,7 @@ from pkmcal.arms.arm import SerialArm
 from pkmcal.cli.options import Json
 from pkmcal.cli.output import say
 from pkmcal.core.library import POSE
-from pkmcal.kinematics.calibratable import ArmMachine
+from pkmcal.kinematics.arm_machine import ArmMachine
 from pkmcal.report.as_json import as_json
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
@@ -10,15 +12,14 @@ import typer
 
 from pkmcal.cli.options import Free, Prior, RobotOrArm, Seed
 from pkmcal.cli.output import say, tell
-from pkmcal.exceptions import ArgumentError
+from pkmcal.exceptions import ArgumentError, Error
 from pkmcal.jobs import measuring
 from pkmcal.jobs.inputs import Inputs
 from pkmcal.jobs.measuring import Driven
 from pkmcal.jobs.plan import Planning
 from pkmcal.jobs.stated import command, quoted
-from pkmcal.live import registry
+from pkmcal.live import course_words, registry
 from pkmcal.live.course import Course
-from pkmcal.live.device import DeviceError
 from pkmcal.live.measuring_run import Rules
 
 START = "start"
@@ -175,17 +176,18 @@ def measure(
         if machine is not None or instrument is not None:
             raise ArgumentError("--replay: nothing is driven: without --machine and --instrument")
         last = _told(measuring.replay(job, str(replay), inputs))
-        return _ended(last, job)
+        return _ended(last)
     if machine is None:
         raise ArgumentError(
             f"--machine: what is driven; it has {registry.words(registry.MACHINES)}; or --replay"
         )
     rules = Rules(feed, dwell, repeats, safe_height)
-    measurement = measuring.driven(job, machine, instrument, rules, str(out), inputs, tell)
-    try:
-        return _measured(measurement, job, out)
-    finally:
-        measurement.close()
+    with _told_of_lost_connections():
+        measurement = measuring.driven(job, machine, instrument, rules, str(out), inputs, tell)
+        try:
+            return _measured(measurement, job, out)
+        finally:
+            measurement.close()
 
 
 def _measured(measurement: Driven, job: Planning, out: Path) -> int:
@@ -198,17 +200,29 @@ def _measured(measurement: Driven, job: Planning, out: Path) -> int:
     last: list[Course] = [course]
     try:
         _told(measurement.start(), last)
-    except (DeviceError, OSError, KeyboardInterrupt) as error:
+    except (Error, OSError, KeyboardInterrupt) as error:
         rows = measurement.log.rows
-        many = "no row" if rows is None else f"{len(rows)} rows"
-        tell(f"stopped with {many} in {out}: the same command goes on")
+        many = 0 if rows is None else len(rows)
+        tell(f"{course_words.stopped(many, str(out))}: the same command goes on")
         if isinstance(error, KeyboardInterrupt):
             raise
         tell(error)
         return 1
-    code = _ended(last[-1], job)
+    code = _ended(last[-1])
     say(quoted(command("calibrate", [job.robot, str(out)], [])))
     return code
+
+
+@contextmanager
+def _told_of_lost_connections() -> Iterator[None]:
+    """A connection that is gone is an error that is told, not the end of this process."""
+    number = getattr(signal, "SIGPIPE", None)  # which ends a program whose output nobody reads
+    before = None if number is None else signal.signal(number, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        if number is not None:
+            signal.signal(number, before)
 
 
 def _started() -> bool:
@@ -219,51 +233,22 @@ def _started() -> bool:
         return False
 
 
-def _many(count: int, what: str) -> str:
-    return f"{count} {what}{'s' * (count != 1)}"
-
-
 def _told(courses: Iterator[Course], last: list[Course] | None = None) -> Course | None:
     """Say what each pose told; the last course."""
     found = None
     for found in courses:
         if last is not None:
             last.append(found)
-        rows = 0 if found.rows is None else len(found.rows)
-        say(f"{_many(found.poses, 'pose')}, {_many(rows, 'row')}: {_predicted(found)}")
-        if found.odd is not None:
-            tell(f"warning: the newest rows contradict the others: {found.odd}")
+        say(course_words.line(found))
+        for warning in course_words.warnings(found):
+            tell(f"warning: {warning}")
     return found
 
 
-def _predicted(course: Course) -> str:
-    import math
-
-    if math.isinf(course.predicted):
-        return "too few to identify all parameters"
-    if math.isnan(course.predicted):
-        return "too few to tell their noise"
-    said = f"predicted error {course.predicted:.3g} mm"
-    if course.stated and course.scatter > 1.0:
-        said += f", for they scatter {course.scatter:.2g} times as far as stated"
-    return said
-
-
-def _ended(course: Course | None, job: Planning) -> int:
+def _ended(course: Course | None) -> int:
     if course is None:
         say("nothing to measure")
         return 1
-    dilution = course.choice.dilution
-    if course.stated and dilution == dilution:
-        say(
-            f"dilution {dilution:.2g}: so many times the noise of a reading arrives at the targets,"
-            " whatever the errors of the machine"
-        )
-    if course.reached:
-        say(f"{_predicted(course)}: enough")
-        return 0
-    if job.accuracy is None:
-        say(f"{_predicted(course)}: measured as many as asked")
-        return 0
-    say(f"{_predicted(course)}: not the {job.accuracy:g} mm asked for")
-    return 1
+    for line in course_words.conclusion(course):
+        say(line)
+    return 0 if course.reached or course.accuracy is None else 1

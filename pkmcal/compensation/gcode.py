@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 from pkmcal.arrays import FloatArray
 from pkmcal.compensation.gcode_dialect import AXES, NEVER_PASSED, Dialect, Meaning
-from pkmcal.compensation.gcode_line import Command, Unclear, Word, commands
+from pkmcal.compensation.gcode_line import Command, Unclear, Word, bare, commands
 from pkmcal.compensation.gcode_move import NO_FEED, Extrusion, Feed, Move
 from pkmcal.compensation.gcode_tools import Carried, Tools
 from pkmcal.exceptions import ArgumentError, FileError
@@ -72,7 +72,9 @@ class Program:
     letters : sequence of str
         The axes that it moves, such as ``"XYZ"``.
     start : ndarray (axes,)
-        Where they are at first, and their angles after homing, mm and deg.
+        Where they are at first, mm and deg.
+    home : ndarray (axes,)
+        Their angles after homing, which are taken to be known where those at first are the same.
     stated : bool
         Whether that is known of the lengths; else a program has to begin with all of them.
     passed : collection of str
@@ -103,6 +105,7 @@ class Program:
         dialect: Dialect,
         letters: Sequence[str],
         start: FloatArray,
+        home: FloatArray,
         stated: bool,
         passed: Collection[str] = (),
         times: bool = False,
@@ -113,6 +116,11 @@ class Program:
         self._content, self._place = content, place
         self._letters, self._stated = tuple(letters), stated
         self._start = tuple(map(float, start))
+        self._homed = {
+            letter
+            for letter, first, homed in zip(letters, start, home, strict=True)
+            if letter in "ABC" and first == homed
+        }
         self._passed = frozenset(name.upper() for name in passed)
         self._times = times
         self._tools = Tools(dialect, tools or {})
@@ -147,7 +155,14 @@ class Program:
             if "\0" in line:
                 raise self.wrong(i, "has a zero byte, at which controllers end a line: no text")
             code = line.rstrip("\r\n")
-            code = code.replace(MARK, " ", 1) if i == 0 else code
+            if code.startswith(MARK) and i == 0:
+                code = code[1:]
+                if bare(code, self.dialect).strip():
+                    raise self.wrong(
+                        i,
+                        "a byte-order mark stands before it, and it may not be read: save it"
+                        " without",
+                    )
             marked = code.strip() == "%" if marked is None and code.strip() else marked
             if code.strip() == "%" and self.dialect.block:
                 marks += bool(marked)
@@ -229,7 +244,8 @@ class Program:
             unless = "" if meaning in NEVER_PASSED else f"; if not here: --pass {shown}"
             raise Unclear(f"{command.shown} {meaning.value}{unless}")
         base = command.name.partition(".")[0]
-        if meaning is None and self.dialect.words.get(base) is Meaning.FOLLOWED:
+        whole = self.dialect.words.get(base)
+        if meaning is None and whole is not None and (whole.refused or whole is Meaning.FOLLOWED):
             raise Unclear(f"{shown} may be read as {base}")
         if meaning is None and axes:
             raise Unclear(
@@ -241,9 +257,9 @@ class Program:
         return meaning or Meaning.MOVES
 
     def _home(self, state: _State) -> None:
-        """Angles are as at first; where homing ends is in the controller's configuration."""
+        """Where homing ends is in the controller's configuration, but for angles of home."""
         state.at, state.fresh, state.lost_by = self._start, True, _HOMING
-        state.known = {each for each in self._letters if each in "ABC"}
+        state.known = set(self._homed)
 
     @staticmethod
     def _mode(command: Command, state: _State) -> None:

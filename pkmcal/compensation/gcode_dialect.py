@@ -92,6 +92,11 @@ class Dialect:
         The word that takes the tool that T selects; empty where T itself does.
     takes_unseen : frozenset of str
         Words that may change the tool in another way.
+    unclear : dict
+        Patterns of lines that versions of it read differently or that act unseen, and why each is
+        refused.
+    longest : int or None
+        How many characters of a line it reads, those of a comment behind it left out.
     """
 
     title: str
@@ -115,6 +120,8 @@ class Dialect:
     repeated: frozenset[str] = frozenset()
     takes: str = ""
     takes_unseen: frozenset[str] = frozenset()
+    unclear: dict[str, str] = field(default_factory=dict)
+    longest: int | None = None
 
     def name(self, letter: str, number: str) -> str:
         """A word as its table has it."""

@@ -19,8 +19,8 @@ def _ascii(pattern: str) -> re.Pattern[str]:
 _WORD = _ascii(rf"([A-Za-z])[ \t]*({_NUMBER})")
 _PLAIN = _ascii(rf"[ \t]*(?:[A-Za-z][ \t]*{_NUMBER}[ \t]*)*")
 _HEAD = _ascii(
-    r"[ \t]*(?:[Nn][ \t]*\d+(?:[ \t]+|$))?"
-    r"(?:([A-Za-z_][A-Za-z_]\w*)|([GMTgmt])[ \t]*(\d+(?:\.\d+)?)?)?"
+    r"[ \t]*(?:([Nn])\d+(?:[ \t]+|$))?"
+    r"(?:([A-Za-z_][A-Za-z_]\w*)|([GMTgmt])([ \t]*)(\d+(?:\.\d+)?)?)?"
 )
 _EXPONENT = _ascii(r"[\d.][Ee][-+]?[\d.]")
 _CHECKSUM = _ascii(r".*\*[ \t]*\d+[ \t]*")
@@ -73,6 +73,11 @@ class Unclear(ValueError):
     """Why a line cannot be followed."""
 
 
+def bare(line: str, dialect: Dialect) -> str:
+    """A line with spaces in place of its remarks."""
+    return _compiled(dialect.remark).sub(_blank, line)
+
+
 def commands(line: str, dialect: Dialect) -> list[Command]:
     """The commands of a line, in the order in which they act.
 
@@ -81,7 +86,10 @@ def commands(line: str, dialect: Dialect) -> list[Command]:
     Unclear
         A line that versions of the firmware read differently, or not at all.
     """
-    code = _compiled(dialect.remark).sub(_blank, line)
+    for pattern, why in dialect.unclear.items():
+        if _compiled(pattern).search(line):
+            raise Unclear(why)
+    code = bare(line, dialect)
     if code.strip() in ("", "%"):
         return []
     return _of_block(code, dialect) if dialect.block else _in_turn(code, dialect)
@@ -90,6 +98,12 @@ def commands(line: str, dialect: Dialect) -> list[Command]:
 @lru_cache
 def _compiled(pattern: str) -> re.Pattern[str]:
     return re.compile(pattern)
+
+
+def require_short(code: str, dialect: Dialect) -> None:
+    """Refuse a line of which the end is not read."""
+    if dialect.longest is not None and len(code.rstrip()) > dialect.longest:
+        raise Unclear(f"{dialect.title} reads {dialect.longest} characters of a line")
 
 
 def _blank(found: re.Match[str]) -> str:
@@ -166,12 +180,14 @@ def _command(code: str, dialect: Dialect) -> tuple[Command, int]:
     """The command that begins a line, and where it ends."""
     head = _HEAD.match(code)
     assert head is not None  # it may be empty
-    macro, letter, number = head.groups()
+    line_number, macro, letter, gap, number = head.groups()
     name, shown = _named(dialect, macro, letter, number or "")
+    if gap and number:
+        raise Unclear(f"not all read {letter}{gap}{number} as {shown}: take out what is between")
     rest = code[head.end() :]
     if macro and dialect.several and name not in dialect.words and _NEXT.search(name):
         raise Unclear(f"{shown} has a G or M in it, with which {dialect.title} begins a command")
-    if dialect.capitals and letter and letter.islower():
+    if dialect.capitals and any(each and each.islower() for each in (line_number, letter)):
         raise Unclear(f"{shown} is not in capitals: {dialect.title} may not read it")
     if name in dialect.texts and not (dialect.several and rest.lstrip().startswith('"')):
         return Command(name, shown), len(code)
@@ -185,6 +201,7 @@ def _command(code: str, dialect: Dialect) -> tuple[Command, int]:
     end = head.end() + len(rest)
     if name and dialect.words.get(name) is not Meaning.FOLLOWED:
         return Command(name, shown, frozenset(_LETTER.findall(rest.upper()))), end
+    require_short(code, dialect)
     if "*" in code and _CHECKSUM.fullmatch(code):
         raise Unclear("the checksum would no longer be right: take checksums out")
     words: dict[str, Word] = {}

@@ -9,8 +9,8 @@ import numpy as np
 from pkmcal.arrays import FloatArray
 from pkmcal.compensation.commanded_machine import CommandedMachine
 from pkmcal.compensation.gcode import Program
+from pkmcal.compensation.gcode_line import Unclear, bare, require_short
 from pkmcal.compensation.gcode_move import Move
-from pkmcal.files.text_lines import MARK
 
 _DECIMALS = 5  # 10 nm, 0.04 arc seconds
 _FIGURES = 7  # of a feed
@@ -44,8 +44,8 @@ class Writer:
         share : sequence of float
             The shares of the move that they end.
         """
-        bare = line.rstrip("\r\n")
-        end = line[len(bare) :] or "\n"
+        kept = line.rstrip("\r\n")
+        end = line[len(kept) :] or "\n"
         self._require(move, len(points))
         if move.fresh is not None:
             known = list(move.fresh) if not self._machine.joints else []
@@ -61,10 +61,9 @@ class Writer:
             fed = fed or feed != ""
             pieces.append((words, extra, feed))
             before, done = point, part
-        text = _first(bare, move, *pieces[0]) + end
+        text = _first(kept, move, *pieces[0]) + end
         if move.begins_times:
-            mark = MARK if text.startswith(MARK) else ""
-            text = mark + "G93" + end + text[len(mark) :]
+            text = "G93" + end + text
         for words, extra, feed in pieces[1:]:
             named = [letter + value for letter, value in words.items()]
             text += " ".join([move.code, *named, *filter(None, [extra, feed])])
@@ -72,7 +71,19 @@ class Writer:
         if fed and not self._machine.joints:
             head = "" if self._program.dialect.block else "G1 "
             text += f"{head}F{_figures(move.feed.turns)}" + end
-        return text if len(bare) < len(line) else text[: -len(end)]
+        self._require_short(move, text)
+        return text if len(kept) < len(line) else text[: -len(end)]
+
+    def _require_short(self, move: Move, text: str) -> None:
+        """Refuse lines that became longer than the firmware reads."""
+        dialect = self._program.dialect
+        if dialect.longest is None or len(text) <= dialect.longest:
+            return
+        try:
+            for each in text.splitlines():
+                require_short(bare(each, dialect), dialect)
+        except Unclear as error:
+            raise self._program.wrong(move.line, f"as corrected: {error}") from None
 
     def _require(self, move: Move, parts: int) -> None:
         """Refuse what cannot be written."""

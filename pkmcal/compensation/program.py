@@ -118,7 +118,8 @@ def compensate_program(
         mm and deg, for a LinuxCNC without kinematics; feed as inverse time, G93.
     start : array_like (6,), optional
         The controller's pose when the program starts, mm and rad. By default the first move has to
-        name X, Y and Z, as has the first behind homing; angles begin with those of home.
+        name X, Y and Z, as has the first behind homing; angles begin with those of home. Behind
+        homing a move has to name angles that did not begin so.
     passed : sequence of str
         Macros and other words, such as ``"PARK"``, that move nothing and change no mode; or
         refused words, such as ``"M420"``, that here do not what they are refused for: the next move
@@ -183,6 +184,7 @@ def compensate_program(
         dialect,
         machine.letters,
         machine.shown(begin[0]),
+        machine.shown(controller.home),
         stated=start is not None,
         passed=words("passed", passed),
         times=joints,

@@ -13,6 +13,7 @@ LINUXCNC = Dialect(
     remark=r"\([^()]*\)|;.*",
     letters=frozenset("FS"),
     inverse_time=True,
+    unclear={r"(?i)[(;][ \t]*py(,|run|reload)": "a comment that runs Python may move the machine"},
     takes="M6",
     takes_unseen=frozenset({"M61"}),
     words=table(

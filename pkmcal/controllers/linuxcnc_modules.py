@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pkmcal.arrays import FloatArray, first_largest
+from pkmcal.arrays import TIED, FloatArray, first_largest
 from pkmcal.controllers import linear_delta, rotary_delta
 from pkmcal.controllers.linear_delta import FirmwareDelta
 from pkmcal.controllers.loss import Loss, fitted
@@ -26,7 +26,6 @@ _LEGS = 6
 _POSES = 200
 _LINEAR = (90.0, 210.0, 330.0)  # of joints 0, 1 and 2
 _ROTARY = (270.0, 30.0, 150.0)
-_ALIKE = 1e-6  # deg by which limbs differ that are not equally near
 _NO_LOSS = Loss(0.0, 0.0, OVER)
 
 
@@ -129,7 +128,7 @@ def _order(angles: tuple[float, ...], joints: tuple[float, ...]) -> list[int]:
     for joint in joints:
         off = np.abs((np.array(angles) - joint + 180.0) % 360.0 - 180.0)
         off[order] = np.inf
-        order.append(first_largest(-off, _ALIKE))
+        order.append(first_largest(-off, TIED))
     return order
 
 

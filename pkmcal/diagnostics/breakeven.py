@@ -25,6 +25,7 @@ from pkmcal.statistics.linear_fit import column_basis
 _KINDS = ("mm", "rad", "1")
 _NOTHING = 1e-9  # share of the largest motion by a number of its unit: less is rounding
 _MOST = {"mm": 0.02, "rad": 0.02, "1": 0.02}  # of the machine's length, rad, and of a ratio
+_POSES = 4096  # at most, over all of them, at which descriptions are compared
 _REDUNDANT = 1e-6  # share of a number's motion that no free number has, below which it is one
 
 
@@ -115,9 +116,10 @@ def _candidates(fit: Fit, robot: Calibratable) -> list[str]:
 
 
 def _twists(fit: Fit) -> FloatArray:
-    """Return the platform's twists by all numbers (6 N, p) at the poses of the fit, mm."""
+    """Return the platform's twists by all numbers (6 N, p) at poses of the fit, mm."""
     end, robot = fit.end, fit.end.robot
-    good = end.status == 0
+    good = np.flatnonzero(end.status == 0)
+    good = good[:: -(-len(good) // _POSES)]
     twists = robot.error_twists(end.pose[good], end.actuators[good]).copy()
     twists[:, :3] *= robot.length
     flat: FloatArray = twists.reshape(-1, twists.shape[2])

@@ -18,7 +18,7 @@ from pkmcal.fitted.fit import Fit
 from pkmcal.fitted.held_numbers import held_numbers
 from pkmcal.fitted.left_out import effect_columns
 from pkmcal.geometry.stated_uncertainty import SCALE, StatedUncertainty
-from pkmcal.kinematics.calibratable import ArmMachine, Calibratable
+from pkmcal.kinematics.calibratable import Calibratable, as_arm
 from pkmcal.readings.predicted import Predicted
 from pkmcal.statistics.score_test import Columns
 
@@ -143,7 +143,7 @@ def _sag(fit: Fit) -> Columns | None:
     Arms yield to the weight of their links: a check of its own tests that at poses left out. Of
     surplus actuators forces do not follow from the weight alone.
     """
-    if isinstance(fit.parameters.robot, ArmMachine) or fit.uncertainty.mixed:
+    if fit.parameters.robot.kind == "arm" or fit.uncertainty.mixed:
         return None
     end = _at(fit)
 
@@ -221,7 +221,8 @@ def _of_arm(fit: Fit) -> Iterator[Cause]:
 
 def waves_a_turn(machine: Calibratable) -> list[Harmonics]:
     """A wave a turn of each joint of an arm that turns; none of another machine."""
-    kinds = machine.arm.kinds if isinstance(machine, ArmMachine) else ()
+    arm = as_arm(machine)
+    kinds = () if arm is None else arm.kinds
     return [Harmonics(1, joints=i) for i, kind in enumerate(kinds, 1) if kind == "revolute"]
 
 

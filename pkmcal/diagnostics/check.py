@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Generic, Literal, TypeVar
 
+from pkmcal.arguments import shown
 from pkmcal.estimation.loss import LIMITS
 from pkmcal.exceptions import ArgumentError
 from pkmcal.fitted.solution import Solution
@@ -172,6 +173,13 @@ class Check(Generic[F]):
     remedies: Callable[[Solution, F], tuple[Remedy, ...]] | None = None
     unless: tuple[str, ...] = ()
     at_once: bool = False
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.name, str) or not self.name:
+            raise ArgumentError(f"name of a check must be a word, found {shown(self.name)}")
+        for field in ("levels", "unless"):
+            if isinstance(several := getattr(self, field), str):
+                object.__setattr__(self, field, (several,))
 
 
 def at_most_one(finding: F | None) -> tuple[F, ...]:

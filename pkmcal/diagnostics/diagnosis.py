@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, MutableMapping, Sequence
-from graphlib import TopologicalSorter
+from graphlib import CycleError, TopologicalSorter
 from typing import Any, get_args
 
 from pkmcal.arguments import instance, kind
-from pkmcal.diagnostics.check import Check, Level, Said
+from pkmcal.diagnostics.check import Check, Level, Remedy, Said
 from pkmcal.display import printable
 from pkmcal.exceptions import ArgumentTypeError
 from pkmcal.fitted.solution import Solution
@@ -42,7 +42,12 @@ class Diagnosis:
     def findings(self, name: str) -> tuple[Any, ...]:
         """Return the findings of all checks, also those that are not worth a word."""
         if name not in self._findings:
-            self._findings[name] = tuple(self._checks[name].run(self._found))
+            seen = self._checks[name].run(self._found)
+            if isinstance(seen, str) or not isinstance(seen, Iterable):
+                raise ArgumentTypeError(
+                    f"{name}: run must return its findings, [] of none; found {kind(seen)}"
+                )
+            self._findings[name] = tuple(seen)
         return self._findings[name]
 
     def said(self) -> tuple[Said, ...]:
@@ -63,9 +68,18 @@ class Diagnosis:
                 raise ValueError(
                     f"{check.name}: level_of must say {levels} or None; said {level!r}"
                 )
-            text = printable(check.say(found, finding), _LONGEST)
-            remedies = () if check.remedies is None else check.remedies(found, finding)
-            yield Said(check.name, level, text, finding, remedies)
+            said = instance(f"{check.name}: what say returns", check.say(found, finding), str)
+            text = printable(said, _LONGEST)
+            yield Said(check.name, level, text, finding, self._remedies(check, finding))
+
+    def _remedies(self, check: Check[Any], finding: Any) -> tuple[Remedy, ...]:
+        several = () if check.remedies is None else check.remedies(self._found, finding)
+        if not isinstance(several, tuple) or not all(isinstance(each, Remedy) for each in several):
+            raise ArgumentTypeError(
+                f"{check.name}: remedies must return a tuple, as in (pkmcal.Remedy('drop', rows),);"
+                f" found {kind(several)}"
+            )
+        return several
 
     def _meant(self, check: Check[Any], other: str) -> Iterator[Iterator[Said]]:
         for one in meant(self._checks.values(), check, other):
@@ -109,5 +123,9 @@ def verified(checks: Sequence[Check[Any]]) -> tuple[Check[Any], ...]:
         if slow := [one.name for one in before if check.at_once and not one.at_once]:
             raise ValueError(f"{check.name}: made at once, it cannot wait for {', '.join(slow)}")
         graph[check.name] = {one.name for one in before}
-    tuple(TopologicalSorter(graph).static_order())  # a circle is a CycleError, a ValueError
+    try:
+        tuple(TopologicalSorter(graph).static_order())
+    except CycleError as error:
+        circle = ", ".join(dict.fromkeys(error.args[1]))
+        raise ValueError(f"unless: checks wait for each other: {circle}") from None
     return tuple(checks)

@@ -20,10 +20,10 @@ from pkmcal.estimation.uncertainty import Uncertainty
 from pkmcal.fitted.fit import Fit
 from pkmcal.readings.predicted import Predicted
 from pkmcal.statistics.score_test import Columns, Score, score_test
+from pkmcal.statistics.shifts import TOLD_APART
 
 CHANCE = 0.01  # below which a target is said to be displaced
 _LARGE = 0.5  # of the squared residuals, from which they are little else
-_ALIKE = 6.63  # drop in units of the variance by which targets differ that can be told apart
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,7 @@ def _alike(known: dict[str, Score], name: str, variance: float) -> Iterator[str]
     """Others that explain as much but for chance."""
     best = known[name]
     for other, score in known.items():
-        if other != name and best.drop - score.drop < _ALIKE * variance:
+        if other != name and best.drop - score.drop < TOLD_APART * variance:
             yield other
 
 

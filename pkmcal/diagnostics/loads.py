@@ -18,7 +18,7 @@ from pkmcal.fitted.fit import Fit
 from pkmcal.fitted.solution import Solution
 from pkmcal.geometry.carried import Load
 from pkmcal.geometry.elastic import COMPLIANCE
-from pkmcal.kinematics.calibratable import ArmMachine, Calibratable
+from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.readings.predicted import Predicted
 from pkmcal.statistics.score_test import Columns, score_test
 
@@ -56,7 +56,7 @@ def _ignored(found: Solution) -> tuple[IgnoredLoads, ...]:
 
 def _of_loads(robot: Calibratable) -> Elasticity:
     """Name what follows loads first in a machine: legs and screws, or joints of an arm."""
-    return _OF_JOINTS if isinstance(robot, ArmMachine) else _OF_LEGS
+    return _OF_JOINTS if robot.kind == "arm" else _OF_LEGS
 
 
 def _by_compliances(fit: Fit, robot: Calibratable) -> Columns:

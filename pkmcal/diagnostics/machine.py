@@ -16,6 +16,7 @@ from pkmcal.estimation.identifiability import listed
 from pkmcal.estimation.mode_slips import in_other_modes
 from pkmcal.fitted.solution import Solution
 from pkmcal.geometry.elastic import is_kinematic
+from pkmcal.kinematics.calibratable import as_parallel
 from pkmcal.kinematics.robot import Robot
 
 FAR = 0.25  # share of the machine's size by which errors of manufacture do not move a parameter
@@ -117,8 +118,8 @@ def _out_of_stroke(found: Solution) -> tuple[OutOfStroke, ...]:
     which may have been misled.
     """
     start, end, equations = found.fit.start, found.fit.end, found.fit.equations
-    robot = start.robot
-    if not isinstance(robot, Robot):
+    robot = as_parallel(start.robot)
+    if robot is None:
         return ()  # the file of an arm states no strokes
     out = _beyond(robot, _drives(end))
     if not out.any():

@@ -23,7 +23,7 @@ from pkmcal.statistics.linear_fit import numbered
 _NEAR = 1e-3  # of the spread of every actuator, within which rows are near
 _LEAST = 5  # such rows
 _CHANCE = 1e-4  # of differences as small, were errors independent
-_ALIKE = 0.5  # times as large as those of independent errors, below which it matters …
+_HARMLESS = 0.5  # times as large as those of independent errors, below which it matters …
 _COPIED = 0.1  # … and they are copies: a model that is wrong alike shows more
 _DISTINCT = 0.5  # of the readings: all touches of a plate read the same
 
@@ -75,7 +75,9 @@ def near_copies(found: Solution) -> NearCopies | None:
     ratio, chance = min(seen)
     chance, share = min(1.0, len(seen) * chance), float(np.sqrt(ratio))
     rows = np.unique(table.rows[later]).tolist()
-    return NearCopies(tuple(rows), share, chance) if chance < _CHANCE and share < _ALIKE else None
+    return (
+        NearCopies(tuple(rows), share, chance) if chance < _CHANCE and share < _HARMLESS else None
+    )
 
 
 def _by_row(labels: Labels, mine: BoolArray, errors: FloatArray, rows: IntArray) -> FloatArray:

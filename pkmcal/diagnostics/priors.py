@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pkmcal.arrays import largest_first
+from pkmcal.arrays import TIED, largest_first
 from pkmcal.diagnostics.check import Check, Remedy, at_most_one
 from pkmcal.display import chance_text
 from pkmcal.fitted.solution import Solution
@@ -14,7 +14,6 @@ from pkmcal.statistics.distributions import t_tail
 from pkmcal.statistics.prior_test import CONTRADICTED, PriorTest
 
 _PULLED = 2.0  # times what is expected, from which a pull on a prior is worth a word
-_ALIKE = 1e-6  # share by which pulls differ that are not equal
 
 
 def _contradicted(found: Solution) -> tuple[PriorTest, ...]:
@@ -25,7 +24,7 @@ def _contradicted(found: Solution) -> tuple[PriorTest, ...]:
 def _contradicted_text(found: Solution, test: PriorTest) -> str:
     """State the chance, the numbers that are pulled most, and a width that would agree."""
     pulls, stated = np.nan_to_num(test.pulls), found.fit.parameters.prior_names
-    worst = [k for k in largest_first(np.abs(pulls), _ALIKE)[:3] if abs(pulls[k]) > _PULLED]
+    worst = [k for k in largest_first(np.abs(pulls), TIED)[:3] if abs(pulls[k]) > _PULLED]
     shown = ", ".join(f"{stated[k]} {abs(pulls[k]):.1f}" for k in worst)
     pulled = f" and pull {shown} times as far as prior and noise let expect" if worst else ""
     return (

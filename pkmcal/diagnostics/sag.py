@@ -14,7 +14,8 @@ from pkmcal.exceptions import ArgumentError
 from pkmcal.fitted.fit import Fit
 from pkmcal.fitted.left_out import Comparison, compared_by_poses, effect_columns
 from pkmcal.fitted.solution import Solution
-from pkmcal.kinematics.calibratable import ArmMachine, Calibratable
+from pkmcal.kinematics.arm_machine import ArmMachine
+from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.statistics.causes import causes
 from pkmcal.statistics.score_test import Columns
 

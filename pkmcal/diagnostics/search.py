@@ -87,6 +87,17 @@ def _undetermined(found: Solution) -> tuple[str, ...]:
     )
 
 
+def _unread(found: Solution) -> tuple[str, ...]:
+    """Numbers of readings, by name, of which each by itself changes nothing that was read."""
+    freed = {*found.fit.start.robot.geometry.names}
+    freed |= {*coefficients(found.fit.equations.prediction.datasets)}
+    return tuple(
+        name
+        for name in found.free
+        if name in found.unidentifiable and name.partition("@")[0] not in freed
+    )
+
+
 CHECKS = (
     Check(
         name="nothing-determined", about="the measurements determine no number of the machine",
@@ -127,6 +138,15 @@ CHECKS = (
             " measurements: measure what the effect moves, or hold it"
         ),
         remedies=lambda found, names: (Remedy("fix", names),),
+    ),
+    Check(
+        name="undetermined-reading", about="numbers of readings that are not determined",
+        levels=("remark",), unless=("grave",),
+        run=lambda found: at_most_one(_unread(found) or None),
+        say=lambda found, names: (
+            f"{listed(names)} {'are' if len(names) > 1 else 'is'} not determined by what was read;"
+            " the machine's numbers do not depend on it"
+        ),
     ),
     Check(
         name="beyond-linear",

@@ -16,13 +16,14 @@ from pkmcal.diagnostics.reach import reach
 from pkmcal.diagnostics.visits import Visits, visits_of
 from pkmcal.display import chance_text, first_rows, printable
 from pkmcal.fitted.solution import Solution
+from pkmcal.statistics.distributions import f_tail
 from pkmcal.statistics.group_test import Groups, few_equations, group_test, within_reach
-from pkmcal.statistics.linear_fit import column_basis, numbered
+from pkmcal.statistics.linear_fit import ROUNDING, column_basis, numbered
 from pkmcal.statistics.two_regressions import best_division
 
 CHANCE = 1e-3  # below which a group of rows is of another machine
 _LARGE = 0.8  # times the residuals, above which errors of a model may be as large
-_FAR = 0.7  # times the residuals, below which rows in no order are of another machine
+_FAR = 0.7  # times the residuals, below which rows in no order, or elsewhere, are of another
 _MOST = 300  # visits of which such rows are looked for
 _OWN = 1.5  # equations for each parameter of such a group
 _SHARE = 0.15  # of the visits, that are no outliers
@@ -44,7 +45,7 @@ class Apart:
         Standard deviation of the residuals with numbers of its own, over that with common ones.
     elsewhere : bool
         Whether it was measured at other places than the other rows, or of other things: then a
-        model that is slightly wrong shows alike.
+        model that is slightly wrong shows alike, as long as it misses no more than the noise.
     """
 
     group: str
@@ -55,7 +56,7 @@ class Apart:
     @property
     def large(self) -> bool:
         """True if the difference is larger than a slightly wrong model shows."""
-        return self.residual < _LARGE and not self.elsewhere
+        return self.residual < (_FAR if self.elsewhere else _LARGE)
 
     @property
     def found(self) -> bool:
@@ -92,7 +93,7 @@ def apart(found: Solution) -> Apart | None:
         name = min(known, key=lambda each: known[each].chance)
         best = known[name]
         chance = min(1.0, len(known) * best.chance)
-        seen = Apart(name, chance, best.apart, _elsewhere(found, groups[name]))
+        seen = Apart(name, chance, best.apart, _elsewhere(found, groups[name], visits))
         if seen.found and seen.large:
             return seen
     other = _in_no_order(found, visits, use, key)
@@ -151,34 +152,41 @@ def _in_no_order(found: Solution, visits: Visits, use: IntArray, key: IntArray) 
     rows = np.zeros(len(sure.equations.table.rows), dtype=bool)
     rows[sure.labels.row[belongs]] = True
     group = f"rows {first_rows(sure.equations.table.rows[rows].tolist(), 6)}"
-    return Apart(group, chance, tested.apart, _elsewhere(found, rows))
+    return Apart(group, chance, tested.apart, _elsewhere(found, rows, visits))
 
 
-def _elsewhere(found: Solution, mine: BoolArray) -> bool:
+def _elsewhere(found: Solution, mine: BoolArray, visits: Visits) -> bool:
     """Return whether rows (N,) were measured at other places, loads or targets than the rest.
 
-    Places and loads that differ explain much of who belongs to the group, linearly.
+    Places and loads that differ explain much of who belongs to the group, linearly. Each visit
+    counts once, however many rows it has.
     """
     table = found.fit.equations.table
-    columns = [np.concatenate([m.actuators for m in table.sets])]
+    first = np.unique(numbered(visits.series, visits.visit), return_index=True)[1]
+    actuators = np.concatenate([m.actuators for m in table.sets])
+    tried = [(actuators[first], mine[first])]
     if len(table.sets) == 1:
         subject = table.sets[0].instrument.subject(len(mine))
-        columns.append(subject[:, None] == np.unique(subject))
+        tried.append((subject[:, None] == np.unique(subject), mine))
     if all(m.load is not None for m in table.sets):
-        columns.append(np.concatenate([m.drive_state.load for m in table.sets]))
-    return max(_explained(each, mine) for each in columns) > _APART
+        load = np.concatenate([m.drive_state.load for m in table.sets])
+        tried.append((load[first], mine[first]))
+    return any(_explained(columns, belongs) for columns, belongs in tried)
 
 
-def _explained(columns: FloatArray, mine: BoolArray) -> float:
-    """Share of the variance of belonging to a group (N,) that columns (N, k) explain, adjusted."""
+def _explained(columns: FloatArray, mine: BoolArray) -> bool:
+    """Return whether columns (N, k) explain who belongs to a group, much and not by chance."""
     belongs = mine - mine.mean()
     columns = columns[:, (columns != columns[0]).any(axis=0)]
     if not columns.size or not belongs.any():
-        return 0.0
+        return False
     basis = column_basis(columns - columns.mean(axis=0))
-    freedom = max(1, len(mine) - basis.shape[1] - 1)
-    share = float(((basis.T @ belongs) ** 2).sum() / (belongs**2).sum())
-    return float(1.0 - (1.0 - share) * (len(mine) - 1) / freedom)
+    ways = basis.shape[1]
+    freedom = max(1, len(mine) - ways - 1)
+    missing = 1.0 - float(((basis.T @ belongs) ** 2).sum() / (belongs**2).sum())
+    ratio = (1.0 - missing) / ways * freedom / max(missing, ROUNDING)
+    much = 1.0 - missing * (len(mine) - 1) / freedom > _APART
+    return much and f_tail(ratio, ways, freedom) < CHANCE
 
 
 def _groups(found: Solution, visits: Visits) -> Iterator[tuple[str, BoolArray]]:

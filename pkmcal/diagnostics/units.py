@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray, rms
+from pkmcal.arrays import TIED, BoolArray, FloatArray, rms
 from pkmcal.diagnostics.check import Check
 from pkmcal.diagnostics.families import GROSS, unlike_families
 from pkmcal.diagnostics.machine import far_numbers
@@ -23,7 +23,6 @@ from pkmcal.measurements.measurements import Measurements
 
 MISFIT_RATIO = 0.2  # of the misfit that another reading may leave to be named as what was meant
 _POOR = 0.1  # share of the misfit that a fit worth its name does not leave
-_ALIKE = 1e-6  # share by which misfits differ that are not equal
 
 
 def likely_unit_errors(
@@ -61,7 +60,7 @@ def likely_unit_errors(
         misfit = {words: _together(off) / by for words, (off, by) in trials.items()}
         # exchanges that are equivalent on a symmetric machine misfit alike
         lowest = min(misfit.values())
-        words = next(text for text in trials if misfit[text] <= lowest * (1.0 + _ALIKE))
+        words = next(text for text in trials if misfit[text] <= lowest * (1.0 + TIED))
         if misfit[words] < MISFIT_RATIO * present and _better_where_reached(trials[words][0], off):
             which = f"measurements {i + 1}: " if len(datasets) > 1 else ""
             where = (

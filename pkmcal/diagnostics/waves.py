@@ -18,7 +18,7 @@ from pkmcal.display import chance_text
 from pkmcal.effects.gears import Harmonics
 from pkmcal.estimation.uncertainty import Uncertainty
 from pkmcal.fitted.solution import Solution
-from pkmcal.kinematics.calibratable import ArmMachine
+from pkmcal.kinematics.calibratable import as_arm
 from pkmcal.statistics.distributions import f_tail
 from pkmcal.statistics.linear_fit import numbered, sums
 
@@ -71,18 +71,14 @@ def scan_waves(found: Solution, waves: Sequence[int] = WAVES) -> tuple[Wave, ...
         than 100 or the loss is robust.
     """
     fit, sure = found.fit, found.fit.uncertainty
-    machine = fit.end.robot
-    if (
-        not isinstance(machine, ArmMachine)
-        or sure.mixed
-        or fit.estimate.state.loss.name != "linear"
-    ):
+    arm = as_arm(fit.end.robot)
+    if arm is None or sure.mixed or fit.estimate.state.loss.name != "linear":
         return ()
     pose = numbered(sure.labels.pose)
     if int(pose.max()) + 1 < LEAST_POSES:
         return ()
     theta, by_joint = _along_joints(found, pose)
-    turning = [i for i, kind in enumerate(machine.arm.kinds) if kind == "revolute"]
+    turning = [i for i, kind in enumerate(arm.kinds) if kind == "revolute"]
     tried = len(turning) * len(waves)
     every = [_largest(i, theta[:, i], by_joint[:, i], sure, pose, waves) for i in turning]
     told = [each._replace(chance=min(1.0, tried * each.chance)) for each in every]

@@ -21,7 +21,8 @@ from pkmcal.effects.effect import Changed
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.elastic import COMPLIANCE, PER_LENGTH
 from pkmcal.geometry.yielding import elastic_numbers
-from pkmcal.kinematics.calibratable import ArmMachine
+from pkmcal.kinematics.arm_machine import ArmMachine
+from pkmcal.kinematics.calibratable import as_arm
 
 
 @dataclass(frozen=True)
@@ -77,8 +78,8 @@ class Elasticity:
             A name that matches no number of a limb and no joint of an arm, or one that does not
             yield.
         """
-        if isinstance(machine, ArmMachine):
-            return self._of_arm(machine.arm)
+        if (arm := as_arm(machine)) is not None:
+            return self._of_arm(arm)
         known = dict(machine.geometry.items())
         patterns = words("numbers", self.numbers)
         numbers = [name for each in patterns for name in elastic_numbers(machine.model, each)]

@@ -17,7 +17,8 @@ from pkmcal.arms.arm import SerialArm
 from pkmcal.arms.joint_laws import Term
 from pkmcal.effects.effect import Changed
 from pkmcal.exceptions import ArgumentError
-from pkmcal.kinematics.calibratable import ArmMachine, Calibratable
+from pkmcal.kinematics.arm_machine import ArmMachine
+from pkmcal.kinematics.calibratable import Calibratable, as_arm
 
 _TURNS = 1e-3  # rad: how large errors of gears are, more or less; of slides as many mm/m of an arm
 Joints = Literal["all"] | int | Sequence[int]
@@ -151,11 +152,12 @@ class Backlash:
 
 
 def _arm(machine: Calibratable, effect: str) -> SerialArm:
-    if not isinstance(machine, ArmMachine):
+    arm = as_arm(machine)
+    if arm is None:
         raise ArgumentError(
             f"{effect}: {machine.name} is no serial arm; limbs have drive laws in the robot file"
         )
-    return machine.arm
+    return arm
 
 
 def _changed(name: str, arm: SerialArm, terms: Sequence[Term], turns: float) -> Changed:

@@ -21,7 +21,8 @@ from pkmcal.arms.weights import gravity_torques
 from pkmcal.arrays import FloatArray
 from pkmcal.effects.effect import Changed
 from pkmcal.exceptions import ArgumentError
-from pkmcal.kinematics.calibratable import ArmMachine, Calibratable
+from pkmcal.kinematics.arm_machine import ArmMachine
+from pkmcal.kinematics.calibratable import Calibratable, as_arm
 
 Joints = Literal["main", "all"] | int | Sequence[int]
 TURNS = 1e-3  # rad: by so much, more or less, the moments of its links turn a joint of an arm
@@ -80,12 +81,12 @@ class Sag:
         ValueError, TypeError
             No arm, a joint that it has not or that gravity cannot turn, masses that are not known.
         """
-        if not isinstance(machine, ArmMachine):
+        arm = as_arm(machine)
+        if arm is None:
             raise ArgumentError(
                 f"sag: {machine.name} is no serial arm; of other machines compliances are numbers"
             )
         turns = number("turns", self.turns, above=0.0)
-        arm = machine.arm
         products = _products(arm)
         joints = self._chosen(arm, products)
         if self.tied:

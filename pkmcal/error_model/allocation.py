@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal.arguments import checked_seed, did_you_mean, flag, number, whole, words
-from pkmcal.arrays import FloatArray, first_largest
+from pkmcal.arrays import TIED, FloatArray, first_largest
 from pkmcal.core.library import POSE
 from pkmcal.display import Table, displayed
 from pkmcal.error_model import shares
@@ -31,7 +31,6 @@ DISTANCE = "distance"
 _SHARE = 0.997  # of the machines
 _TAIL = 3.0  # standard deviations: about this share of the machines is within
 _SURE = 1.645  # standard deviations: so that 99.7 % keep the limits with 95 % confidence
-_ALIKE = 1e-6  # share by which poses differ that are not equally tight
 _ROUNDS, _SCALED = 5, 1e-3  # of scaling: at most so many, until one changes less
 _JOINT = re.compile(r"([a-z_]+[0-9]+)\.[xyz]")  # base1.x belongs to base1.*
 
@@ -207,7 +206,7 @@ def allocate_tolerance(
         used_up = {name: _within(row) for name, row in zip(limits, together, strict=True)}
     spent = use[:, felt] * sigma[felt] ** 2
     total = spent.sum(axis=1)
-    tightest = spent[first_largest(total, _ALIKE * float(total.max()))]
+    tightest = spent[first_largest(total, TIED * float(total.max()))]
     contribution = np.zeros(len(groups))
     contribution[felt] = 100 * tightest / tightest.sum()
     return Allocation(

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from pkmcal import display
 from pkmcal.arguments import checked_seed, number, whole
-from pkmcal.arrays import FloatArray, IntArray, as_numbers, largest_first, rms
+from pkmcal.arrays import TIED, FloatArray, IntArray, as_numbers, largest_first, rms
 from pkmcal.core.library import POSE
 from pkmcal.core.statistics import pose_errors
 from pkmcal.display import Table
@@ -24,7 +24,6 @@ from pkmcal.result import Result
 
 WORST = 3.0  # standard deviations by which every number is off in the worst case
 SHARES = {"interval95": (0.025, 0.975), "interval997": (0.0015, 0.9985)}
-_ALIKE = 1e-6  # per cent by which shares differ that are not equal
 _NONE = 1e-12  # of the largest effect on a position or an orientation: no effect
 _LISTED = 12  # numbers of the geometry that are printed
 
@@ -141,7 +140,7 @@ class Tolerance(Result):
             f" {within997}\n"
         )
         share = self.position_share
-        order = largest_first(share, _ALIKE)[:_LISTED]
+        order = largest_first(share, TIED)[:_LISTED]
         listed = [[*self._with_unit(k), display.fixed(float(share[k]), 1)] for k in order]
         yield Table(["number", "sigma", "share of position [%]"], listed, left=1)
         if self.failures():

@@ -29,7 +29,7 @@ from pkmcal.arrays import BoolArray, FloatArray, IntArray, mm_per_unit
 from pkmcal.estimation.row_states import RowStates
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics import pose_steps
-from pkmcal.kinematics.calibratable import Calibratable
+from pkmcal.kinematics.calibratable import Calibratable, as_parallel
 from pkmcal.kinematics.robot import Robot
 
 _HELD = 1e-9  # of the size: a step back onto held rows after which its square is rounding
@@ -110,7 +110,7 @@ class ExactActuators:
         self, robot: Calibratable, states: RowStates, places: IntArray
     ) -> FloatArray | None:
         """Twists, actuators held."""
-        return robot.error_twists(states.pose, states.actuators)[:, :, places]
+        return robot.error_twists(states.pose, states.actuators).take(places, axis=2)
 
 
 class NoisyActuators:
@@ -343,8 +343,9 @@ class FreePoses:
 
 def machine_of(robot: Calibratable) -> Robot:
     """The parallel machine that rows with poses of their own are of."""
-    assert isinstance(robot, Robot)  # arms have no surplus closures
-    return robot
+    found = as_parallel(robot)
+    assert found is not None  # arms have no surplus closures
+    return found
 
 
 def one_mm(robot: Calibratable, read: FloatArray) -> FloatArray:
@@ -357,7 +358,7 @@ def has_equations(
 ) -> bool:
     """Return whether closures are equations for these deviations; see `closures_of`."""
     noisy = estimated or any(sigma is not None and bool(sigma.any()) for sigma in sigmas)
-    return noisy or (isinstance(robot, Robot) and pose_steps.surplus(robot) > 0)
+    return noisy or (pose_steps.surplus(robot) > 0)
 
 
 def closures_of(
@@ -379,8 +380,8 @@ def closures_of(
     """
     if sigma is None and estimated:
         sigma = one_mm(robot, read)
-    if isinstance(robot, Robot) and pose_steps.surplus(robot) > 0:
-        return FreePoses(robot, read, one_mm(robot, read) if sigma is None else sigma)
+    if pose_steps.surplus(robot) > 0:
+        return FreePoses(machine_of(robot), read, one_mm(robot, read) if sigma is None else sigma)
     if sigma is None or not has_equations(robot, [sigma], estimated):
         return ExactActuators(read)
     return NoisyActuators(read, sigma)

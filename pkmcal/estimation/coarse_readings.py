@@ -11,7 +11,7 @@ from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.labels import Labels
 from pkmcal.statistics.covariance import Covariance
 from pkmcal.statistics.linear_fit import LinearFit
-from pkmcal.statistics.steps import deviation, step_of
+from pkmcal.statistics.steps import deviation, smallest_gaps, step_of
 
 DITHERED = 1.5  # times a step's deviation, from which residuals are noise that spreads the steps
 _MATTERS = 0.6  # times the residuals, from which half a step in all rows is more than their mean's
@@ -62,6 +62,7 @@ def coarse_readings(
     found = []
     for i, measured in enumerate(equations.table.sets):
         values = measured.values.reshape(len(measured), -1)
+        gaps = smallest_gaps(values)
         for k, unit in enumerate(measured.units):
             mine = (named.set_of == i) & (component == k)
             if not mine.any():
@@ -72,8 +73,10 @@ def coarse_readings(
             residual = float(np.sqrt(squares / freedom)) if freedom > 0 else float("nan")
             used = covariance.scale * weighted**0.5
             used = residual if covariance.rule == "cluster" else used
-            step = step_of(values[:, k], unit, least=_least(residual, used))
-            if step:
+            least = _least(residual, used)
+            if gaps[k] < 0.5 * least:  # no step, and quicker than to look for one
+                continue
+            if step := step_of(values[:, k], unit, least=least):
                 found.append(Coarse(i, k, step, residual, freedom, used))
     return tuple(found)
 

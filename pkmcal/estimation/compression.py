@@ -69,15 +69,15 @@ class RowsInLots:
     count: IntArray
 
     @classmethod
-    def of(cls, prediction: Prediction, whitening: Whitening, i: int) -> RowsInLots | None:
-        """Find the lots of set `i`; None where rows have nothing in common, or stay as many.
+    def of(
+        cls, prediction: Prediction, whitening: Whitening, i: int, alike: IntArray
+    ) -> RowsInLots | None:
+        """Find the lots of set `i` among rows that are `alike` (N,); None where they stay as many.
 
         Rows of a lot are at one pose and depend on the same parameters.
         """
         measured, table = prediction.table.sets[i], prediction.table
-        alike = measured.instrument.lots(measured)
-        turning = measured.instrument.turning is not None
-        if alike is None or turning or prediction.effects[i]:
+        if measured.instrument.turning is not None or prediction.effects[i]:
             return None
         if len(np.unique(whitening.groups[i])) > 1:  # numbers of a lot have one noise
             return None
@@ -236,7 +236,11 @@ def compressed(
     The third result is how many numbers that were read each row, or lot, stands for beyond its own.
     """
     table = prediction.table
-    found = tuple(RowsInLots.of(prediction, whitening, i) for i in range(len(table.sets)))
+    alike = [m.instrument.lots(m) for m in table.sets]
+    found = tuple(
+        None if own is None else RowsInLots.of(prediction, whitening, i, own)
+        for i, own in enumerate(alike)
+    )
     if not any(found):
         return None
     chosen = [

@@ -21,7 +21,6 @@ from pkmcal.estimation.tensioned_poses import unknown_tensions
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.kinematics.pose_steps import surplus
-from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
 
 Said = Mapping[str, Known | Sequence[Known]]  # of "frame", "target" and "attachment"
@@ -91,7 +90,7 @@ def informative(machine: Calibratable, datasets: list[FitData]) -> tuple[list[Fi
         return datasets, 0
     sigmas = [measured.actuator_sigma for measured in sets]
     equations = has_equations(machine, sigmas, tells_actuators(sets))
-    spare = isinstance(machine, Robot) and surplus(machine) > 0
+    spare = surplus(machine) > 0
     kept, unread = [], 0
     for data in datasets:
         values = data.measured.values.reshape(len(data.measured), -1)

@@ -18,12 +18,13 @@ class Cache(TypedDict, total=False):
     """A cache of results at an evaluation, each made by its function.
 
     "system" is of some noise (G,), too; "following" (K, u, n) is how unknowns of the poses follow
-    the parameters.
+    the parameters; "derivatives" are those of rows of sets, once.
     """
 
     predicted: tuple[object, tuple[Predicted, ...]]
     system: tuple[object, FloatArray, System]
     following: tuple[object, FloatArray]
+    derivatives: tuple[object, list[tuple[int, slice, FloatArray]]]
 
 
 @dataclass(frozen=True, eq=False)

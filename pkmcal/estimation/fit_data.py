@@ -12,7 +12,7 @@ from pkmcal.arrays import BoolArray, IntArray
 from pkmcal.effects.effect import Effect
 from pkmcal.exceptions import ArgumentError
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.readings.unknowns import PLACE, Dependence, Numbers, Start, points_of
+from pkmcal.readings.unknowns import PLACE, Dependence, Numbers, Start, points_of, yielded
 
 FRAME = "frame"  # the role of frames
 
@@ -79,8 +79,9 @@ class FitData:
         ValueError
             A dependence that does not have one entry for each row.
         """
-        own = self.measured.instrument.dependences(self)
-        of_effects = (effect.dependences(self.measured) for effect in self.effects)
+        instrument = self.measured.instrument
+        own = yielded(instrument, instrument.dependences(self))
+        of_effects = (yielded(each, each.dependences(self.measured)) for each in self.effects)
         for each in (*own, *chain.from_iterable(of_effects)):
             if not len(each.index) == len(each.given) == len(self.measured):
                 raise ArgumentError(

@@ -56,11 +56,12 @@ def parameters(
     """
     geometry = robot.geometry
     free, along = _free_names(robot, asked)
-    places = np.array([geometry.names.index(name) for name in (*free, *along)], dtype=np.intp)
+    known = geometry.names
+    places = np.array([known.index(name) for name in (*free, *along)], dtype=np.intp)
     beside = _beside_geometry(datasets) | _of_residuals(asked.residuals, geometry.names)
     ends = np.cumsum([len(places), *(len(each.names) for each in beside.values())]).tolist()
     blocks = dict(zip(beside, map(slice, ends, ends[1:]), strict=False))
-    numbers = [geometry.names[i] for i in places]
+    numbers = [known[i] for i in places.tolist()]
     numbers += [name for each in beside.values() for name in each.names]
     scope = scopes(numbers, blocks, asked.per_session, asked.by_set)
     entries = _entries(len(places), scope, blocks, datasets, asked.held_points)
@@ -75,7 +76,8 @@ def parameters(
     of_uncertain = spread(
         asked.uncertainty, [n for n, own in zip(names, uncertain, strict=True) if own]
     )
-    every = [geometry.units[i] for i in places]
+    units_of = geometry.units
+    every = [units_of[i] for i in places.tolist()]
     every += [unit for each in beside.values() for unit in each.units]
     if not names:
         raise ArgumentError("free: name at least one parameter, nothing else is unknown")
@@ -225,6 +227,11 @@ def _beside_geometry(datasets: Sequence[FitData]) -> dict[tuple[str, str], Numbe
                     f" alike: {', '.join(known.names)} [{', '.join(known.units)}] and"
                     f" {', '.join(own.names)} [{', '.join(own.units)}]; give each a role of its own"
                 )
+            if not np.isfinite(own.start).all():
+                raise ArgumentError(
+                    f"{role}: the search for {', '.join(own.names)} has a start that is no finite"
+                    " number"
+                )
             if not np.array_equal(known.start, own.start):
                 raise ArgumentError(
                     f"{role}: {role} {name} starts at different places in different"
@@ -331,7 +338,8 @@ def _prior(
     """Return the prior of each parameter: as effects state it, unless `prior` names it."""
     prior = asked.prior
     sigma = np.full(len(names), np.inf)
-    of_effects = [asked.of_effects.get(name.partition("@")[0], np.inf) for name in names]
+    own = asked.of_effects
+    of_effects = [own.get(name.partition("@")[0], np.inf) if own else np.inf for name in names]
     if isinstance(prior, Mapping):
         sigma[:] = of_effects
     if isinstance(prior, Mapping):

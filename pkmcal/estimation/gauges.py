@@ -18,6 +18,7 @@ from pkmcal.estimation.elastic_gauges import elastic_motions
 from pkmcal.estimation.parameters import Parameters
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.load import AT, CELL, FORCE
+from pkmcal.kinematics.calibratable import as_parallel
 from pkmcal.kinematics.robot import Robot
 from pkmcal.screw import from_pose
 
@@ -45,8 +46,8 @@ def gauges(
     rest : ndarray (n, e)
         The other unidentifiable combinations.
     """
-    robot = parameters.robot
-    if not unidentifiable.shape[1] or not isinstance(robot, Robot):
+    robot = as_parallel(parameters.robot)
+    if not unidentifiable.shape[1] or robot is None:
         return (), unidentifiable
     if robot.model.chains is not None:  # whose numbers are errors of joints, not places of points
         found, free = frame_motions(parameters, robot, unidentifiable)
@@ -54,7 +55,7 @@ def gauges(
         of_all = np.pad(np.insert(free, _SCALE, 0.0, axis=0), ((0, 1), (0, 0)))
         return tuple(_texts(of_all)), unidentifiable @ rest
     moves = _motions(robot)
-    beside = _swivel_zeros(parameters) | _of_load(parameters)
+    beside = _swivel_zeros(parameters, robot) | _of_load(parameters, robot)
     numbers = moves.reshape(-1, moves.shape[2])[robot.geometry.slot_index]
     chain = robot.geometry.chain[:, parameters.places]
     change = np.linalg.pinv(chain) @ numbers  # of the free numbers, as far as they can follow
@@ -144,10 +145,9 @@ def _tilts(robot: Robot, i: int) -> dict[str, FloatArray]:
     return found
 
 
-def _swivel_zeros(parameters: Parameters) -> dict[int, FloatArray]:
+def _swivel_zeros(parameters: Parameters, robot: Robot) -> dict[int, FloatArray]:
     """Return derivatives of the zeros of swivel angles by the motions, by parameter."""
-    robot, found = parameters.robot, {}
-    assert isinstance(robot, Robot)
+    found = {}
     for i in robot.model.pulleys:
         name = f"angle.swivel{i + 1}.zero"
         for k, own in enumerate(parameters.names):
@@ -157,10 +157,8 @@ def _swivel_zeros(parameters: Parameters) -> dict[int, FloatArray]:
     return found
 
 
-def _of_load(parameters: Parameters) -> dict[int, FloatArray]:
+def _of_load(parameters: Parameters, robot: Robot) -> dict[int, FloatArray]:
     """Return derivatives by the motions of load numbers that tensions balance, by parameter."""
-    robot = parameters.robot
-    assert isinstance(robot, Robot)
     load, middle = robot.model.balanced_load, robot.slots[:, 3:6].mean(axis=0)
     if load is None:
         return {}

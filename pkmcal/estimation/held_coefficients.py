@@ -11,7 +11,7 @@ import numpy as np
 from pkmcal.effects.effect import Effect, EffectOfRows
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.sessions import matches
-from pkmcal.readings.unknowns import Dependence, Numbers
+from pkmcal.readings.unknowns import Dependence, Numbers, yielded
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ def coefficients(datasets: Sequence[FitData]) -> tuple[str, ...]:
             name
             for data in datasets
             for effect in data.effects
-            for dependence in effect.dependences(data.measured)
+            for dependence in yielded(effect, effect.dependences(data.measured))
             for numbers in dependence.estimated.values()
             for name in numbers.names
         )

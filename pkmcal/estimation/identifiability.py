@@ -187,6 +187,8 @@ def sparse_basis(unidentifiable: FloatArray, names: Sequence[str]) -> FloatArray
         The largest entry of each column is 1.
     """
     d = unidentifiable.shape[1]
+    if not d:
+        return unidentifiable
     families = [_family(name) for name in names]
     kinds = list(dict.fromkeys(families))
     member = np.array([[family == kind for kind in kinds] for family in families])

@@ -180,6 +180,8 @@ class Search:
         self._cache.clear()
         for evaluation in (self.start, trail.near, trail.here):
             evaluation.cache.pop("following", None)
+            if evaluation is not trail.here:  # of which they are asked for once more
+                evaluation.cache.pop("derivatives", None)
 
     def _batches(self, evaluation: Evaluation, noise: FloatArray) -> Iterator[Batch]:
         """`own_jacobian` in batches, finite or not."""

@@ -11,15 +11,15 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray
+from pkmcal.arrays import TIED, BoolArray, FloatArray
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.misfits import rounding
+from pkmcal.kinematics.calibratable import as_parallel
 from pkmcal.kinematics.robot import Robot
 from pkmcal.screw import from_pose, to_pose
 
 MIRROR = "its mirror image fits as well: which of the two it is, the robot file says alone"
-_ALIKE = 1e-6  # share by which costs differ that are the same
 _FAR = 1e4  # times the cost, at mirrored poses: no image, which would have the same there
 _FLAT = 1e-9  # of the machine's size: points in one plane
 _DIMENSIONS = {"translation": 3, "xy": 2, "spatial": 3, "planar": 2}
@@ -31,8 +31,8 @@ def mirror_fits(equations: Equations, evaluation: Evaluation, noise: FloatArray)
 
     The poses are fitted there. Axes, such as those of swivels, are left as they are.
     """
-    robot, parameters = evaluation.robot, equations.parameters
-    if not isinstance(robot, Robot) or not equations.machines.unknowns:
+    robot, parameters = as_parallel(evaluation.robot), equations.parameters
+    if robot is None or not equations.machines.unknowns:
         return False
     if robot.model.chains is not None or robot.model.map not in _DIMENSIONS:
         return False
@@ -58,7 +58,7 @@ def mirror_fits(equations: Equations, evaluation: Evaluation, noise: FloatArray)
         ):
             continue
         there = image.at(theta, noise, states)
-        if there.ok and _cost(image, there, noise) <= (1.0 + _ALIKE) * cost:
+        if there.ok and _cost(image, there, noise) <= (1.0 + TIED) * cost:
             return True
     return False
 

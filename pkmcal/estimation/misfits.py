@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, rms
@@ -9,18 +11,18 @@ from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.pose_system import PoseSystem
 from pkmcal.measurements.measurements import Measurements
+from pkmcal.readings.predicted import Predicted
 
 _ROUNDING = 2e-15  # of the largest value: the error of a solved pose
 
 
-def worst_readings(equations: Equations, pose: FloatArray, theta: FloatArray) -> FloatArray:
-    """Return the worst reading of each pose (K, 6), mm (K,); inf without a pose.
+def worst_readings(equations: Equations, predicted: Sequence[Predicted]) -> FloatArray:
+    """Return the worst reading of each pose, mm (K,), of what is predicted; inf without a pose.
 
     Angles count as their arc. NaN where nothing was read.
     """
-    worst = np.full(len(pose), np.nan)
-    prediction = equations.prediction
-    residuals = prediction.residuals(prediction.at(pose, theta))
+    worst = np.full(len(equations.table.actuators), np.nan)
+    residuals = equations.prediction.residuals(predicted)
     for m, mm, place, residual in zip(
         equations.table.sets, equations.mm, equations.table.pose_of, residuals, strict=True
     ):
@@ -96,15 +98,21 @@ def _closures_off(system: PoseSystem, evaluation: Evaluation) -> FloatArray:
 def rounding(equations: Equations, noise: FloatArray) -> float:
     """Length of the whitened rounding errors of what is predicted, for noise (G,)."""
     equations = equations.whole or equations
-    length, readings, sigma = equations.parameters.robot.length, 0.0, equations.machines.sigma
+    readings, sigma = 0.0, equations.machines.sigma
     if equations.system is None or equations.whitening.any_read:
-        parts = [rounding_of(m, length) for m in equations.table.sets]
-        readings = float(np.linalg.norm(equations.whitening.whitened(parts, noise)))
+        readings = float(np.linalg.norm(rounding_of_readings(equations, noise)))
     if equations.system is None or sigma is None:
         return readings
     size = _ROUNDING * float(np.abs(equations.table.actuators).max())
     whitened = size / (noise[equations.system.blocks.groups] * sigma)
     return float(np.hypot(readings, np.linalg.norm(whitened)))
+
+
+def rounding_of_readings(equations: Equations, noise: FloatArray) -> FloatArray:
+    """Whitened rounding errors (M,) of what is predicted of readings, for noise (G,)."""
+    length = equations.parameters.robot.length
+    parts = [rounding_of(m, length) for m in equations.table.sets]
+    return equations.whitening.whitened(parts, noise)
 
 
 def rounding_of(measured: Measurements, length: float) -> FloatArray:

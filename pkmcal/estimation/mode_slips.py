@@ -10,12 +10,13 @@ from __future__ import annotations
 import numpy as np
 
 from pkmcal.arguments import instance
-from pkmcal.arrays import BoolArray, FloatArray, IntArray, largest_first
+from pkmcal.arrays import TIED, BoolArray, FloatArray, IntArray, largest_first
 from pkmcal.display import first_rows
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.misfits import worst_readings
 from pkmcal.estimation.row_states import RowStates
+from pkmcal.kinematics.calibratable import as_parallel
 from pkmcal.kinematics.robot import Robot
 
 _GROSS = 6.0  # times the median misfit from which a row is tried in other modes
@@ -23,7 +24,6 @@ _LEAST = 1e-3  # mm; misfits of measurements without noise
 _HALF = 0.5  # of the misfit that another mode may leave
 _FITTING = 4.0  # times what is gross, beyond which no mode fits
 _NEIGHBOURS = 6  # rows from whose poses a machine is solved whose modes are not known
-_ALIKE = 1e-6  # share of the spread by which rows differ that are not equally far
 _MOST = 0.5  # share of the poses that may miss grossly: of more, something else is wrong
 
 
@@ -66,9 +66,10 @@ def _better(equations: Equations, evaluation: Evaluation) -> tuple[IntArray, Flo
     """Distinct rows of actuators (s,) that another mode fits better, and their poses there."""
     machines, pose = evaluation.machines, evaluation.pose
     none = np.empty(0, dtype=np.intp), np.empty((0, 6))
-    if not isinstance(evaluation.robot, Robot):
+    if as_parallel(evaluation.robot) is None:
         return none  # an arm has one pose
-    misfit = worst_readings(equations, pose, evaluation.theta)
+    prediction = equations.prediction
+    misfit = worst_readings(equations, prediction.predicted(evaluation))
     solved, read = np.isfinite(misfit), ~np.isnan(misfit)
     if not solved.any():
         return none
@@ -91,7 +92,7 @@ def _better(equations: Equations, evaluation: Evaluation) -> tuple[IntArray, Flo
         trial = pose.copy()
         for k, of_row in zip(gross, modes, strict=True):
             trial[k] = of_row[j] if j < len(of_row) else np.nan
-        now = worst_readings(equations, trial, evaluation.theta)
+        now = worst_readings(equations, prediction.at(trial, evaluation.theta))
         nearer = now < least
         least, best = np.where(nearer, now, least), np.where(nearer[:, None], trial, best)
     fits = (least < _HALF * np.where(solved, misfit, np.inf)) & (least <= _FITTING * limit)
@@ -109,6 +110,6 @@ def _modes(
     there = np.flatnonzero(sound)
     spread = np.maximum(np.ptp(actuators, axis=0), np.finfo(float).tiny)
     apart = np.linalg.norm((actuators[there] - actuators[k]) / spread, axis=1)
-    near = there[largest_first(-apart, _ALIKE)[:_NEIGHBOURS]]
+    near = there[largest_first(-apart, TIED)[:_NEIGHBOURS]]
     solved = robot.forward(np.tile(actuators[k], (len(near), 1)), pose[near])
     return np.vstack([found.poses, solved.pose[solved.ok]])

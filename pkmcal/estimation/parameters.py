@@ -23,7 +23,6 @@ from pkmcal.estimation.smoothness import smoothness_rows
 from pkmcal.estimation.uncertain_numbers import inverse_root
 from pkmcal.geometry.stated_uncertainty import NOTHING, StatedUncertainty
 from pkmcal.kinematics.calibratable import Calibratable
-from pkmcal.kinematics.robot import Robot
 
 Prior = float | Mapping[str, float | tuple[float, float]] | None
 Known = Literal["known", "unknown"]
@@ -284,9 +283,8 @@ class Parameters:
 
         What each session has for itself is there by its name with the session alone.
         """
-        robot, values = self.robot, self.values_at(theta)
-        if isinstance(robot, Robot):  # numbers may be tied to others
-            values = robot.with_values(values).geometry.values
+        robot = self.robot  # whose numbers may be tied to others
+        values = robot.with_values(self.values_at(theta)).geometry.values
         found = dict(zip(robot.geometry.names, values.tolist(), strict=True))
         for place, scope in zip(self.places.tolist(), self.scope, strict=False):
             if scope != "common":
@@ -297,9 +295,8 @@ class Parameters:
         """Derivative (n,) of each of `by_name` by the parameters."""
         geometry, columns = self.robot.geometry, self.geometry_of()
         rates = np.eye(len(geometry.values))
-        if isinstance(self.robot, Robot):
-            chain = self.robot.with_values(self.values_at(theta)).geometry.chain
-            rates[: len(chain)] = chain
+        chain = self.robot.with_values(self.values_at(theta)).geometry.chain
+        rates[: len(chain)] = chain
         by_theta = np.zeros((len(rates), len(self)))
         by_theta[:, columns] = rates[:, self.places]
         own = dict(zip(self.names, self.reported_rates(theta), strict=True))

@@ -19,6 +19,7 @@ from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.estimate import Estimate
 from pkmcal.estimation.estimator import Estimator
 from pkmcal.estimation.evaluation import Evaluation
+from pkmcal.kinematics.calibratable import as_parallel
 from pkmcal.kinematics.robot import Robot
 
 _ANGLES = POSE[3:]
@@ -50,8 +51,8 @@ def in_least_minima(
     `noise` (G,) is that of `Equations.at`. The evaluation itself where nothing is found, and where
     poses have no unknowns.
     """
-    robot = equations.parameters.robot
-    if equations.system is None or not isinstance(robot, Robot):
+    robot = as_parallel(equations.parameters.robot)
+    if equations.system is None or robot is None:
         return evaluation
     factors = np.ones(len(equations.blocks.unstated)) if noise is None else noise
     freedom = _freedom(equations)

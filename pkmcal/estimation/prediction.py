@@ -166,10 +166,11 @@ class Prediction:
     def of_set(self, i: int, pose: FloatArray, theta: FloatArray) -> Predicted:
         """Predict the readings of a set at poses (K, 6), with their derivatives."""
         m = self.table.sets[i]
-        if not m.components:
+        components = len(m.instrument.components)
+        if not components:
             return Predicted(np.empty((len(m), 0)), np.empty((len(m), 0, 6)))
         alone = self._by_geometry_alone(i, pose, theta)
-        require_predicted(m.kind, len(m.components), len(m), alone)
+        require_predicted(m.kind, components, len(m), alone)
         moved = self._moved(i, alone, pose, theta)
         require_derivatives(m.instrument, moved, self.numbers[i])
         return moved
@@ -241,7 +242,7 @@ class Prediction:
         numbers, by = self.arguments_of(i, theta), dict(predicted.by)
         change = np.zeros(predicted.values.shape)
         for effect in effects:
-            for machine, rows in self._machines(i, theta):
+            for machine, rows in self.machines_of(i, theta):
                 for place, by_twist in places:
                     at = place[rows]
                     found = effect.moved(machine, pose[at], table.actuators[at], rows, numbers)
@@ -267,11 +268,11 @@ class Prediction:
             pose[self.table.pose_of[i]],
             None if other is None else pose[other],
             axis=self.datasets[i].axis,
-            machines=lambda: self._machines(i, theta),
+            machines=lambda: self.machines_of(i, theta),
             measured=measured,
         )
 
-    def _machines(self, i: int, theta: FloatArray) -> Iterator[tuple[Calibratable, IntArray]]:
+    def machines_of(self, i: int, theta: FloatArray) -> Iterator[tuple[Calibratable, IntArray]]:
         """The machines of set `i`, one or one a session, and the rows of each."""
         table, p = self.table, self.parameters
         machine_of_row = table.machine_of_pose[table.pose_of[i]]
@@ -293,7 +294,13 @@ class Prediction:
 
         A batch is rows through all sets, and for each set that has some of these its rows and their
         derivative (b, k, n). There is one batch where poses have unknowns.
+
+        Where there are few rows the evaluation has them for the next who asks.
         """
+        owner, known = evaluation.cache.pop("derivatives", (None, []))
+        if owner is self:
+            yield slice(0, len(self.table.rows)), known
+            return
         table, count, size = self.table, len(self.table.rows), len(self.parameters)
         predicted, machines = self.predicted(evaluation), evaluation.machines
         direct = [self.by_geometry(i, evaluation) for i in range(len(table.sets))]
@@ -319,6 +326,9 @@ class Prediction:
                 wide = by_parameters(part, table.columns, table.part_of[i][rows], size)
                 read, residual = table.sets[i].instrument, misfits[i][rows]
                 found.append((i, rows, read.by_difference(wide, residual)))
+            if count <= _BATCH:
+                again = [(i, rows, part.copy()) for i, rows, part in found]
+                evaluation.cache["derivatives"] = self, again
             yield batch, found
 
     def by_geometry(self, i: int, evaluation: Evaluation) -> FloatArray | None:
@@ -363,13 +373,16 @@ class Prediction:
             first = last
 
     def _poses_of(self, some: Sequence[tuple[int, slice]]) -> IntArray:
-        """Distinct poses of rows of sets, in order."""
+        """Distinct poses of rows of sets: in the order of the rows, unless some have one."""
         table = self.table
         if sum(rows.stop - rows.start for _, rows in some) == len(table.rows):
             return np.arange(len(table.actuators))
         pairs = [((table.pose_of[i], table.other_of[i]), rows) for i, rows in some]
         ends = [end[rows] for both, rows in pairs for end in both if end is not None]
-        return np.unique(np.concatenate(ends))
+        whole = np.concatenate(ends)
+        count, last = np.arange(len(whole)), np.empty(len(table.actuators), dtype=np.intp)
+        last[whole] = count
+        return whole if np.array_equal(last[whole], count) else np.unique(whole)
 
 
 def _columns(of_rows: IntArray, numbers: IntArray) -> IntArray:

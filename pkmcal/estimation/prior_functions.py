@@ -15,9 +15,7 @@ import numpy as np
 from pkmcal.arguments import did_you_mean, number
 from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.exceptions import ArgumentError
-from pkmcal.geometry.geometry import Geometry
 from pkmcal.kinematics.calibratable import Calibratable, NamedNumbers
-from pkmcal.kinematics.robot import Robot
 
 _OPERATOR = re.compile(r"\s+([+-])\s+")
 _BEHIND = "@.0123456789"  # a point's name without it says which body it is of
@@ -65,11 +63,10 @@ class PriorFunction:
         values[places] = theta[self.columns]
         p, slopes = len(values), self.rows[:, len(values) :].copy()
         by_own = self.rows[:, :p]
-        if isinstance(robot, Robot):  # numbers may be tied to others
-            geometry: Geometry = robot.with_values(values).geometry
-            values, k = geometry.values, len(geometry.numbers)
-            by_own = by_own[:, :k] @ geometry.chain
-            by_own[:, k:] += self.rows[:, k:p]
+        geometry = robot.with_values(values).geometry  # whose numbers may be tied to others
+        values, k = geometry.values, len(geometry.chain)
+        by_own = by_own[:, :k] @ geometry.chain
+        by_own[:, k:] += self.rows[:, k:p]
         np.add.at(slopes.T, self.columns, by_own[:, places].T)
         sums = self.rows @ np.concatenate([values, theta])
         if len(sums) == 1:

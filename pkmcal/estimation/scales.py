@@ -10,7 +10,6 @@ from pkmcal.arrays import FloatArray, mm_per_unit
 from pkmcal.geometry.carried import CARRIED
 from pkmcal.geometry.elastic import COMPLIANCE, PER_LENGTH
 from pkmcal.kinematics.calibratable import Calibratable
-from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
 
 _GRAVITY = 9.80665  # m/s²
@@ -31,7 +30,7 @@ def unit_scales(robot: Calibratable, sets: Sequence[Measurements]) -> dict[str, 
     pull = max(_pull(robot, each) for each in sets)
     found |= {"1/N": 1.0 / travel / pull, "N": pull / length}
     found["rad/(N mm)"] = 1.0 / length / (_WEIGHT * length)
-    if not isinstance(robot, Robot) or robot.model.elastic is None:
+    if robot.model.elastic is None:
         return found
     found |= {"mm/N": 1.0 / pull, "rad/(N mm)": 1.0 / pull / length**2}
     softness = _softness(robot, pull)
@@ -51,8 +50,6 @@ def _pull(robot: Calibratable, measured: Measurements) -> float:
     forces = [1.0]
     if measured.tension is not None:
         forces.append(float(np.nanmax(np.abs(measured.tension), initial=0.0)))
-    if not isinstance(robot, Robot):
-        return max(forces)
     if (load := robot.model.balanced_load) is not None:
         forces += [abs(each) for each in load.force]
     if robot.model.elastic is not None:
@@ -70,11 +67,11 @@ def _weights(carried: FloatArray, own: float, length: float) -> FloatArray:
     return np.asarray((own + carried[:, 0]) * _GRAVITY + force + moment / length)
 
 
-def _softness(robot: Robot, pull: float) -> float:
+def _softness(robot: Calibratable, pull: float) -> float:
     """Largest compliance, mm/N; of angles as their arcs by a force at the length."""
     largest = 0.0
-    for name, unit in zip(robot.geometry.names, robot.geometry.units, strict=True):
+    for (name, value), unit in zip(robot.geometry.items(), robot.geometry.units, strict=True):
         if name.startswith(COMPLIANCE) and not name.endswith(PER_LENGTH):
             arc = robot.length**2 if unit == "rad/(N mm)" else 1.0
-            largest = max(largest, abs(float(robot.geometry[name])) * arc)
+            largest = max(largest, abs(value) * arc)
     return largest or _SOFTNESS * robot.length / pull

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
-from pkmcal.kinematics.calibratable import Calibratable
+from pkmcal.kinematics.calibratable import Calibratable, as_parallel
 from pkmcal.kinematics.robot import Robot
 
 
@@ -39,9 +39,8 @@ def smoothness_rows(
         Of the numbers that are not free.
     """
     none = np.empty((0, size)), np.empty(0)
-    if not isinstance(robot, Robot):
-        return none
-    bends = _bends(robot)
+    parallel = as_parallel(robot)
+    bends = np.empty((0, 0)) if parallel is None else _bends(parallel)
     if not len(bends):
         return none
     geometry = robot.geometry

@@ -221,7 +221,7 @@ def unknown_tensions(robot: Calibratable, sets: Sequence[Measurements]) -> bool:
         Of this machine they cannot be; or tensions that were read in part.
     """
     stated = [measured.tension_sigma is not None for measured in sets]
-    balanced = isinstance(robot, Robot) and robot.model.balanced_load is not None
+    balanced = robot.model.balanced_load is not None
     if not balanced and not any(stated):
         if any(m.tension is not None and np.isnan(m.tension).any() for m in sets):
             raise ArgumentError(
@@ -231,9 +231,7 @@ def unknown_tensions(robot: Calibratable, sets: Sequence[Measurements]) -> bool:
         return False
     if any(stated) and not all(stated):
         raise ArgumentError("measurements: state tension_sigma of all sets, or of none")
-    stretching = isinstance(robot, Robot) and any(
-        law is not None and law.stretch for law in robot.model.laws
-    )
+    stretching = any(law is not None and law.stretch for law in robot.model.laws)
     if not stretching and all(measured.tension is None for measured in sets):
         return False
     why = _hindrance(robot)
@@ -244,7 +242,7 @@ def unknown_tensions(robot: Calibratable, sets: Sequence[Measurements]) -> bool:
 
 def _hindrance(robot: Calibratable) -> str:
     """Why tensions of a machine cannot be unknowns; "" where they can."""
-    if not isinstance(robot, Robot):
+    if robot.kind == "arm":
         return "it is a serial arm"
     if robot.model.chains is not None:
         return "its limbs are chains of joints"

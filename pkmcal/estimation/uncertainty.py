@@ -14,7 +14,7 @@ from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.estimate import Estimate
 from pkmcal.estimation.estimator import FEW, Estimator
 from pkmcal.estimation.labels import Labels, component_classes, labels, poses_of_rows
-from pkmcal.estimation.misfits import rounding
+from pkmcal.estimation.misfits import rounding, rounding_of_readings
 from pkmcal.estimation.set_noise import slipped
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.statistics.covariance import Covariance, CovarianceRule, covariance
@@ -101,9 +101,20 @@ class Uncertainty:
 
     @cached_property
     def rounded(self) -> bool:
-        """True if the residuals are nothing but rounding errors."""
-        limit = _ROUNDED * rounding(self.equations, self.factors)
-        return bool(np.linalg.norm(self.fit.residual) < limit)
+        """True if the residuals are nothing but rounding errors.
+
+        Components that were read as exactly 0 and are met, as the height of a plane, do not count
+        beside others: without noise of their own, rounding alone is much of them.
+        """
+        residual = self.fit.residual
+        if np.linalg.norm(residual) >= _ROUNDED * rounding(self.equations, self.factors):
+            return False
+        use = self.fit.without_idle(np.arange(len(residual)))
+        readings = self.equations.system is None and self.equations.whole is None
+        if not readings or not len(use) or len(use) == len(residual):
+            return True
+        errors = rounding_of_readings(self.equations, self.factors)[use]
+        return bool(np.linalg.norm(residual[use]) < _ROUNDED * np.linalg.norm(errors))
 
     @property
     def mixed(self) -> bool:

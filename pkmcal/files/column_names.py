@@ -13,6 +13,7 @@ from collections.abc import Collection, Sequence
 from pkmcal.core.library import POSE
 
 BESIDE = ("index", "time", "date", "comment", "name", "collection")  # not looked at by themselves
+OF_A_USER = "beside"  # columns with names behind it that the user chose
 RESERVED = (
     "sigma",
     "cov",
@@ -28,6 +29,7 @@ RESERVED = (
     "payload",
     "force",
     "moment",
+    OF_A_USER,
 )
 EULER = (("rx", "ry", "rz"), ("a", "b", "c"), ("w", "p", "r"))  # in the order of their letters
 VECTOR = ("rvx", "rvy", "rvz")
@@ -230,7 +232,9 @@ def _alone(name: str) -> str:
         return f"temperature.q{match['after'] or match['before']}"
     if dotted := _dotted(name):
         return dotted
-    small = name.lower()
+    small, (head, dot, own) = name.lower(), name.partition(".")
+    if head.lower() == OF_A_USER:
+        return f"{OF_A_USER}{dot}{own}"
     return small if small.partition(".")[0] in RESERVED else name
 
 

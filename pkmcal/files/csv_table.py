@@ -16,6 +16,7 @@ import math
 import re
 import shlex
 from collections.abc import Callable, Collection, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from os import PathLike
 
@@ -29,7 +30,7 @@ from pkmcal.exceptions import FileError
 from pkmcal.files import reading, units
 from pkmcal.files.column_names import BESIDE, is_known
 from pkmcal.files.header import Header, find_header, parted
-from pkmcal.files.number_text import Signs, decimals, plain, thousands, undecided
+from pkmcal.files.number_text import Signs, decimals, numbers_alone, plain, thousands, undecided
 from pkmcal.files.reading import LONGEST_NAME, MOST_CELLS, MOST_COLUMNS
 from pkmcal.files.text_rows import is_number, text_rows
 from pkmcal.files.understood import Understood
@@ -132,7 +133,7 @@ class Table:
         self._comma = packed or text.separator != ","
         self._header_line = header.line
         self._units = dict(header.units)
-        self.left_out: tuple[str, ...] = ()  # headings of unknown columns
+        self.left_out: dict[str, str | None] = {}  # headings of unknown columns, and their units
         self._forgotten: list[Column] = []
         self._units_taken: dict[str, tuple[str, str]] = {}  # of columns, and where each is stated
         self._default_units = dict(default_units or {})
@@ -147,23 +148,25 @@ class Table:
         self.lines = [line for line, _ in rows]
         self._decimals = decimals(cells for _, cells in rows) if self._comma else {}
         self.columns: dict[str, Column] = {}
-        for i, heading in enumerate(names):
-            self._add(i, heading, tuple(cells[i] for _, cells in rows))
+        columns = zip(*(cells for _, cells in rows), strict=True)
+        for i, (heading, cells) in enumerate(zip(names, columns, strict=True)):
+            self._add(i, heading, cells)
 
     def _rows_below(
         self, header: Header, packed: bool, separator: str
     ) -> list[tuple[int, list[str]]]:
         """The rows of the table with their lines, each as wide as the header."""
         names = header.headings
-        rows = [(line, cells) for line, cells in header.rows if any(cells)]
-        again = [line for line, cells in rows if _fitted(cells, names, packed) == names]
+        rows = [
+            (line, _fitted(cells, names, packed)) for line, cells in header.rows if any(cells)
+        ]
+        again = {line: None for line, cells in rows if cells == names}
         if again and header.line:
-            self.notes.append(f"column names once more in line {again[0]}, left out")
+            self.notes.append(f"column names once more in line {next(iter(again))}, left out")
             rows = [(line, cells) for line, cells in rows if line not in again]
         if not rows:
             raise FileError(f"{self.path}: no rows below the column names of line {header.line}")
         width = len(names)
-        rows = [(line, _fitted(cells, names, packed)) for line, cells in rows]
         while len(rows) > 1 and len(rows[-1][1]) < width and not any(map(is_number, rows[-1][1])):
             line, below = rows.pop()
             self.notes.append(
@@ -214,6 +217,12 @@ class Table:
         """Forget columns that are not looked at."""
         self._forgotten += [self.columns[name] for name in names if name in self.columns]
         self.columns = {n: column for n, column in self.columns.items() if n not in names}
+
+    def without(self, names: Collection[str]) -> Table:
+        """The table without some columns; this one keeps them."""
+        found = copy(self)
+        found.columns = {n: column for n, column in self.columns.items() if n not in names}
+        return found
 
     def take(self, rows: Sequence[int]) -> None:
         """Keep these rows, in this order."""
@@ -292,7 +301,7 @@ class Table:
         """An error that a column is not there; `otherwise` is said where none was left out."""
         hint = otherwise
         if self.left_out:
-            named = ", ".join(map(repr, self.left_out[:_SHOWN]))
+            named = ", ".join(map(repr, list(self.left_out)[:_SHOWN]))
             more = ", …" if len(self.left_out) > _SHOWN else ""
             number = re.findall(r"\d+", name)[-1:]
             alike = [
@@ -348,14 +357,7 @@ class Table:
         elif column.unit:
             self._units_taken[name] = column.unit, "heading"
         quantity, (times, over) = self._conversion(name, column, quantities, expected)
-        values = np.empty(len(self))
-        signs = self._signs(name, column)
-        for row, cell in enumerate(column.cells):
-            if unseen and cell.lower() in _UNSEEN:
-                values[row] = math.nan
-                self.note(f"cells with {printable(cell)!r} taken as not measured")
-                continue
-            values[row] = math.nan if blank and not cell else self._number(name, row, cell, signs)
+        values = self._values(name, column, blank, unseen)
         with np.errstate(over="ignore"):
             converted = values * times / over
         if (row := int(np.argmax(np.isinf(converted)))) or np.isinf(converted[0]):
@@ -364,6 +366,23 @@ class Table:
                 name, row, f"expected a smaller number, found {printable(cell)!r}"
             )
         return converted, quantity
+
+    def _values(self, name: str, column: Column, blank: bool, unseen: bool) -> FloatArray:
+        """The numbers of a column as they stand."""
+        alone = numbers_alone(column.cells)  # as programs write them, which may be very many
+        if alone is not None and np.isfinite(alone).all():
+            if column.decimal_comma:
+                self._decide(name, column)
+            return np.array(alone)
+        values = np.empty(len(self))
+        signs = self._signs(name, column)
+        for row, cell in enumerate(column.cells):
+            if unseen and cell.lower() in _UNSEEN:
+                values[row] = math.nan
+                self.note(f"cells with {printable(cell)!r} taken as not measured")
+                continue
+            values[row] = math.nan if blank and not cell else self._number(name, row, cell, signs)
+        return values
 
     def stacked(self, names: Sequence[str], units: Sequence[str]) -> FloatArray:
         """Columns of numbers side by side (rows, k), each in its unit; all have to be there."""

@@ -9,6 +9,7 @@ _THOUSANDS = re.compile(  # told from decimals by the other sign, or by a blank
     r"[+-]?[0-9]{1,3}(?:(?P<point>(?:\.[0-9]{3})+,[0-9]+)|(?P<comma>(?:,[0-9]{3})+\.[0-9]+)"
     r"|(?:(?P<blank>[ '\u2019\u00a0\u202f])[0-9]{3})+(?:(?P<decimal>[.,])[0-9]*)?)"
 )
+_ALONE = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _EITHER = re.compile(r"[+-]?[1-9][0-9]{0,2}[.,][0-9]{3}")  # a thousand and more, or less than that
 _DECIMALS = re.compile(r"[+-]?[0-9]*[.,][0-9]*(?:[eE][+-]?[0-9]+)?")
 _NO_NUMBER = "no number"
@@ -32,6 +33,17 @@ def thousands(cells: Iterable[str]) -> tuple[Signs, str] | None:
         if match:
             return ((".", ",") if match["point"] else (",", ".")), cell
     return None
+
+
+def numbers_alone(cells: Sequence[str]) -> list[float] | None:
+    """The numbers of cells that have nothing but digits, a point and an exponent, or None.
+
+    Examples
+    --------
+    >>> numbers_alone(["1.5", "-2e3"]), numbers_alone(["1.5", "2,5"])
+    ([1.5, -2000.0], None)
+    """
+    return list(map(float, cells)) if all(map(_ALONE.fullmatch, cells)) else None
 
 
 def is_either(cell: str) -> bool:

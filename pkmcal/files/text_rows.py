@@ -32,6 +32,7 @@ _CONTACT = re.compile(
     r"|Bed X: ?(-?[0-9.]+) Y: ?(-?[0-9.]+) Z: ?(-?[0-9.]+)"
 )
 _REPORTS = ("probe at ", "Bed X:", "bed will contact at")  # what such lines hold
+_LONGEST_CELL = 131_072  # that csv takes
 _GAP = re.compile(r" {2,}")
 _BRACKET = re.compile(r"\s+(?=[\[(])")
 
@@ -111,6 +112,9 @@ def _take_triggers(found: TextRows, what: str, triggers: list[tuple[int, re.Matc
 
 def cells(path: Path, line: int, text: str, separator: str) -> list[str]:
     """The cells of one line."""
+    if not any(each in text for each in '"\0') and len(text) <= _LONGEST_CELL:  # nothing is quoted
+        parts = [cell.strip() for cell in text.split(separator)]
+        return [cell for cell in parts if cell] if separator == " " else parts
     try:
         (found,) = csv.reader([text], delimiter=separator, skipinitialspace=True, strict=True)
     except csv.Error as error:

@@ -21,7 +21,7 @@ from pkmcal.estimation.estimator import Estimator
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.identifiability import decompose, listed
 from pkmcal.estimation.parameters import Asked, Parameters
-from pkmcal.kinematics.robot import Robot
+from pkmcal.kinematics.calibratable import as_parallel
 from pkmcal.kinematics.workspace import sample_poses
 from pkmcal.screw import from_pose
 from pkmcal.statistics.linear_fit import ROUNDING
@@ -165,9 +165,9 @@ class _Frames:
 def _over_the_workspace(evaluation: Evaluation) -> tuple[FloatArray, FloatArray]:
     """Poses (N, 6) and actuator coordinates (N, n) out to most of the workspace."""
     robot = evaluation.robot
-    if isinstance(robot, Robot):
+    if (parallel := as_parallel(robot)) is not None:
         try:
-            places: FloatArray = sample_poses(robot, _POSES, share=_SHARE)
+            places: FloatArray = sample_poses(parallel, _POSES, share=_SHARE)
         except ValueError:  # no workspace about home: where it was measured
             solved = evaluation.status == 0
             return evaluation.pose[solved], evaluation.actuators[solved]

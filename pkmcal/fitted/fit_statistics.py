@@ -23,7 +23,6 @@ from pkmcal.estimation.uncertainty import Uncertainty
 from pkmcal.fitted.distances import distances
 from pkmcal.fitted.dropped import outlying
 from pkmcal.fitted.nuisances import in_result, nuisances
-from pkmcal.kinematics.robot import Robot
 from pkmcal.statistics.distributions import t_factor
 from pkmcal.statistics.linear_fit import triangle
 from pkmcal.statistics.prior_test import LEAST_FREEDOM, PriorTest, left_alone, prior_test
@@ -88,7 +87,7 @@ def identifiability(estimator: Estimator, estimate: Estimate, hidden: int) -> di
     chosen = equations.parameters
     names: tuple[str, ...] = ()
     rest = measured.unidentifiable
-    yields = isinstance(chosen.robot, Robot) and chosen.robot.model.elastic is not None
+    yields = chosen.robot.model.elastic is not None
     if equations.machines.unknowns or yields:
         names, rest = gauges(chosen, rest)
         if len(estimate.prior):  # a tape on two anchors ends the scale, say

@@ -59,6 +59,8 @@ def nuisances(
         Theirs, by the noise and the stated uncertainties, without a factor on these.
     """
     mine = np.flatnonzero(chosen.uncertain)
+    if not len(mine):
+        return ()
     change = (theta - chosen.start)[mine]
     left = np.diagonal(covariance)[mine]
     stated = np.diagonal(chosen.spread)
@@ -82,6 +84,8 @@ def nuisances(
 
 def in_result(chosen: Parameters, beside: tuple[Nuisance, ...]) -> BoolArray:
     """Mark parameters (n,) that are part of the result."""
+    if not chosen.uncertain.any():
+        return np.ones(len(chosen), dtype=bool)
     far = {each.name for each in beside if each.moved}
     return np.array([
         not own or name in far for name, own in zip(chosen.names, chosen.uncertain, strict=True)

@@ -22,7 +22,7 @@ from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.pose_minima import in_least_minima, solved_in_least_minima, squares_of_poses
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.limb_kinds import KINDS
-from pkmcal.kinematics.calibratable import Calibratable
+from pkmcal.kinematics.calibratable import Calibratable, as_parallel
 from pkmcal.kinematics.robot import Robot
 from pkmcal.statistics.robust_scale import median_ratio
 
@@ -206,8 +206,8 @@ def listed_slack(cables: Sequence[SlackCable]) -> str:
 
 def _pulling(equations: Equations) -> BoolArray:
     """Mark closures of cables, (equations,)."""
-    robot = equations.parameters.robot
-    if not isinstance(robot, Robot) or robot.model.chains is not None:
+    robot = as_parallel(equations.parameters.robot)
+    if robot is None or robot.model.chains is not None:
         return np.zeros(equations.machines.equations, dtype=bool)
     home = robot.inverse(robot.home)[None]
     slope = robot.machine.slopes(robot.slots, home)[0]
@@ -224,9 +224,9 @@ def _slopes(equations: Equations, evaluation: Evaluation) -> FloatArray:
     """Return slopes of cable lengths by readings (K, equations), negative if reversed."""
     actuators = equations.machines.actuators
 
-    def slopes(robot: Calibratable, poses: IntArray) -> FloatArray:
-        found = np.ones((len(poses), len(actuators)))
-        if not isinstance(robot, Robot) or robot.model.chains is not None:
+    def slopes(machine: Calibratable, poses: IntArray) -> FloatArray:
+        found, robot = np.ones((len(poses), len(actuators))), as_parallel(machine)
+        if robot is None or robot.model.chains is not None:
             return found
         slope = robot.machine.slopes(robot.slots, equations.table.actuators[poses])
         for k, a in enumerate(actuators):

@@ -7,6 +7,7 @@ values are numbers of the geometry themselves; this module says which there are 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 from pkmcal.arrays import Unit
 from pkmcal.geometry.load import is_of_load
@@ -100,6 +101,7 @@ def _point(name: str, unit: Unit) -> dict[str, Unit]:
     return {f"{name}.{axis}": unit for axis in "xyz"}
 
 
+@cache
 def is_kinematic(name: str) -> bool:
     """Return whether a number is one of a limb, or ties some; not of loads or compliances."""
     return not is_elastic(name) and not is_of_load(name)

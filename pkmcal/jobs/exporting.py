@@ -18,6 +18,7 @@ from pkmcal.exceptions import ArgumentError
 from pkmcal.jobs.configuration import Exporting
 from pkmcal.jobs.inputs import Inputs
 from pkmcal.jobs.output import Output
+from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.kinematics.robot import Robot
 from pkmcal.loading import load, load_parallel
 
@@ -77,7 +78,7 @@ def _machine(robot: str, target: Target, inputs: Inputs) -> Robot | SerialArm:
     if target.takes == "parallel":
         return load_parallel(inputs.robot(robot))
     machine: Robot | SerialArm = load(inputs.robot(robot))
-    if target.takes == "arm" and not isinstance(machine, SerialArm):
+    if target.takes == "arm" and as_machine(machine).kind != "arm":
         raise ArgumentError(f"{robot}: --as {target.name} is for serial arms")
     return machine
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ import numpy as np
 from pkmcal.arguments import number, whole
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray
-from pkmcal.exceptions import ArgumentError
+from pkmcal.exceptions import ArgumentError, Error
 from pkmcal.files import provenance
 from pkmcal.jobs import planning
 from pkmcal.jobs.inputs import Inputs
@@ -23,6 +24,7 @@ from pkmcal.live import registry
 from pkmcal.live.course import UNSTATED, Course
 from pkmcal.live.device import Instrument, Machine
 from pkmcal.live.measuring_run import MeasuringRun, Rules, measured_already
+from pkmcal.live.person import Ask
 from pkmcal.live.replay import places, replayed
 from pkmcal.live.row_log import RowLog
 from pkmcal.measurements.measurement_csv import read_measurements
@@ -90,10 +92,8 @@ class Driven:
         self._run.stop()
 
     def close(self) -> None:
-        """Free what was opened."""
-        self.log.close()
-        for each in self._devices:
-            each.close()
+        """Free what was opened; who does not answer any more has said so before."""
+        _close([self.log, *self._devices])
 
 
 def driven(
@@ -104,6 +104,7 @@ def driven(
     out: str,
     inputs: Inputs,
     tell: Tell,
+    ask: Ask | None = None,
 ) -> Driven:
     """Connect machine and instrument, and open the log, or go on with one that is there.
 
@@ -122,6 +123,8 @@ def driven(
         Reads files.
     tell : callable
         Takes lines on what happens.
+    ask : callable, optional
+        Asks a person and returns what is typed; by default the terminal does.
 
     Raises
     ------
@@ -165,17 +168,22 @@ def driven(
             robot, candidates, done=done, measured=_there(log.rows, robot, sigma, job), **options
         )
         course = _course(job, choice, stated, options, log.rows, len(done))
-        opened.append(registry.machine(machine, robot))
+        opened.append(registry.machine(machine, robot, ask))
         if instrument is not None:
-            opened.append(registry.instrument(instrument, kind.units))
+            opened.append(registry.instrument(instrument, kind.units, ask))
     except BaseException:
-        for each in opened:
-            each.close()
+        _close(opened)
         raise
     devices = opened[1:]
     run = MeasuringRun(robot, devices[0], devices[1] if instrument else None, log, rules, tell)
     words = _words(machine, instrument, rules, candidates[choice.indices], robot, out)
     return Driven(course, log, words, run, tuple(devices))
+
+
+def _close(opened: list[Any]) -> None:
+    for each in opened:
+        with suppress(Error, OSError):
+            each.close()
 
 
 def _noise_of(job: Planning) -> tuple[bool, Planning]:
@@ -218,6 +226,8 @@ def _checked(job: Planning, rules: Rules, kind: Reading, instrument: str | None)
     number("--feed", rules.feed, above=0)
     number("--dwell", rules.dwell, least=0)
     whole("--repeats", rules.repeats, 1, 1000)
+    if rules.safe_height is not None:
+        number("--safe-height", rules.safe_height)
     if job.accuracy is None and job.count is None:
         raise ArgumentError("--accuracy or --count: state when to stop")
     if (instrument is None) == bool(kind.components):

@@ -1,24 +1,26 @@
-"""The interface that calibration asks of a machine, and its adapter for serial arms."""
+"""The interface that calibration asks of a machine: the one door to parallel machines and arms."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from typing import Protocol
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Literal, Protocol
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal.arguments import instance
 from pkmcal.arms.arm import SerialArm
-from pkmcal.arms.arm_geometry import arm_geometry
-from pkmcal.arrays import BoolArray, FloatArray, Int32Array, as_rows
-from pkmcal.core import screws
+from pkmcal.arrays import BoolArray, FloatArray, Int32Array, Unit
+from pkmcal.geometry.box import Box
 from pkmcal.geometry.carried import Load
-from pkmcal.geometry.stated_uncertainty import NOTHING, StatedUncertainty
+from pkmcal.geometry.chains import Chains
+from pkmcal.geometry.controller import Controller
+from pkmcal.geometry.elastic import Elastic
+from pkmcal.geometry.laws import Law
+from pkmcal.geometry.load import CableLoad
+from pkmcal.geometry.model import Limb
+from pkmcal.geometry.stated_uncertainty import StatedUncertainty
+from pkmcal.kinematics.arm_machine import ArmMachine
 from pkmcal.kinematics.robot import Robot
-
-_OK, _INVALID = 0, 4  # of a row, as in `Forward`
 
 
 class Solved(Protocol):
@@ -63,12 +65,19 @@ class NamedNumbers(Protocol):
     def values(self) -> FloatArray:
         """Values of the numbers (p,)."""
 
+    @property
+    def chain(self) -> FloatArray:
+        """Derivative of the numbers that may be tied, by all of them."""
+
+    def items(self) -> Iterable[tuple[str, float]]:
+        """Name and value of each number."""
+
     def match(self, patterns: str | Iterable[str], argument: str = "") -> list[str]:
         """Names that names and wildcards choose."""
 
 
-class FreeByDefault(Protocol):
-    """The declarations of a robot file."""
+class Declarations(Protocol):
+    """The declarations of a robot file; `Model` describes each. Most of an arm's are empty."""
 
     @property
     def free(self) -> tuple[str, ...]:
@@ -78,9 +87,49 @@ class FreeByDefault(Protocol):
     def uncertainty(self) -> StatedUncertainty:
         """Stated uncertainty of numbers that a calibration does not look for."""
 
+    @property
+    def limbs(self) -> tuple[Limb, ...]:
+        """The limbs."""
+
+    @property
+    def chains(self) -> Chains | None:
+        """The joints, where limbs are chains."""
+
+    @property
+    def laws(self) -> tuple[Law | None, ...]:
+        """The law of each drive of a limb."""
+
+    @property
+    def driven(self) -> bool:
+        """True if a drive of a limb has a law beside its gain and offset."""
+
+    @property
+    def elastic(self) -> Elastic | None:
+        """What yields of the limbs, and what pulls at it."""
+
+    @property
+    def load(self) -> CableLoad | None:
+        """What acts on a platform on cables."""
+
+    @property
+    def balanced_load(self) -> CableLoad | None:
+        """The load that tensions of the rows balance."""
+
+    @property
+    def workspace(self) -> Box:
+        """Least and largest value of coordinates of the pose."""
+
+    @property
+    def controller(self) -> Controller | None:
+        """The firmware from which the numbers were imported."""
+
 
 class Calibratable(Protocol):
     """A machine that can be calibrated: `Robot`, and a `SerialArm` through `ArmMachine`."""
+
+    @property
+    def kind(self) -> Literal["parallel", "arm"]:
+        """What it is."""
 
     @property
     def name(self) -> str:
@@ -107,8 +156,19 @@ class Calibratable(Protocol):
         """The p numbers that may be free."""
 
     @property
-    def model(self) -> FreeByDefault:
+    def model(self) -> Declarations:
         """The declarations of its file."""
+
+    @property
+    def commands(self) -> Mapping[str, Unit]:
+        """Name and unit of what a user commands: coordinates of the pose, or of an arm's joints."""
+
+    def as_commands(self, pose: FloatArray, actuators: FloatArray) -> FloatArray:
+        """What a user commands to have these poses (N, 6) by these coordinates (N, n)."""
+
+    @property
+    def passive_names(self) -> tuple[str, ...]:
+        """Names of the joints that may be read beside the actuators."""
 
     @property
     def yields(self) -> bool:
@@ -119,6 +179,15 @@ class Calibratable(Protocol):
 
     def with_values(self, values: FloatArray) -> Calibratable:
         """Return the machine for a step of a search: quickly, for numbers near the present ones."""
+
+    def approaching(self, approach: FloatArray) -> Calibratable:
+        """The machine with actuators that come from these coordinates (N, n)."""
+
+    def tensioned(self, tension: FloatArray) -> Calibratable:
+        """The machine with drives under tension (N, n), N; an arm does not follow it."""
+
+    def under(self, load: Load) -> Calibratable:
+        """The machine under what its platform or tool carries."""
 
     def forward(self, q: FloatArray, guess: FloatArray | None = None) -> SolvedRows:
         """Poses at actuator coordinates (N, n)."""
@@ -133,97 +202,6 @@ class Calibratable(Protocol):
         """Poses (N, 6), actuator coordinates (N, n) and batch shape of what a user commands."""
 
 
-@dataclass(frozen=True)
-class ArmModel:
-    """The declarations of an arm: joint errors are free, what its joints add is held."""
-
-    free: tuple[str, ...]
-    uncertainty: StatedUncertainty = NOTHING
-
-
-@dataclass(frozen=True, eq=False)
-class ArmPoses:
-    """Poses (N, 6) of the tool, x y z α β γ, and status (N,): 0 ok, 4 invalid input."""
-
-    pose: FloatArray
-    status: Int32Array
-
-    @property
-    def ok(self) -> BoolArray:
-        """Mask of rows that have a pose."""
-        return np.equal(self.status, _OK)
-
-
-class ArmMachine:
-    """A serial arm as `Calibratable`.
-
-    Parameters
-    ----------
-    arm : SerialArm
-        The arm; its joint errors are the numbers of the geometry.
-    """
-
-    def __init__(self, arm: SerialArm) -> None:
-        self.arm = arm
-        self.name, self.length = arm.name, arm.length
-        self.n_actuators, self.actuator_units = arm.n_joints, arm.actuator_units
-        self.joint_names = arm.joint_names
-        self.geometry = arm_geometry(arm.joint_errors, arm.laws)
-        self.model = ArmModel(self.geometry.names[: 6 * arm.n_joints], arm.uncertainty)
-        self.home = screws.pose(arm.home.reshape(1, 16))[0]
-
-    @property
-    def yields(self) -> bool:
-        """True if a joint yields to the load at the tool."""
-        return self.arm.laws is not None and self.arm.laws.yielding
-
-    def replace(self, changes: FloatArray) -> ArmMachine:
-        """Return the arm with other joint errors (6 n,) and numbers of joint laws, mm and rad."""
-        of_joints = 6 * self.n_actuators
-        arm = self.arm.replace(changes[:of_joints].reshape(-1, 6))
-        if arm.laws is not None:
-            arm = arm.with_laws(arm.laws.with_values(changes[of_joints:]))
-        return ArmMachine(arm)
-
-    def approaching(self, approach: FloatArray) -> ArmMachine:
-        """Return the arm for joints that come from these coordinates (N, n)."""
-        return ArmMachine(self.arm.approaching(approach))
-
-    def under(self, load: Load) -> ArmMachine:
-        """Return the arm under a load at the tool, one for all rows or one each."""
-        return ArmMachine(self.arm.under(load))
-
-    def with_values(self, values: FloatArray) -> ArmMachine:
-        """Return `replace` of these values, which is quick here."""
-        return self.replace(values)
-
-    def forward(self, q: ArrayLike, guess: ArrayLike | None = None) -> ArmPoses:
-        """Poses at joint coordinates (N, n); an arm needs no guess."""
-        motions = self.arm.forward(q).reshape(-1, 16)
-        known = np.isfinite(motions[:, 0])
-        status = np.where(known, _OK, _INVALID).astype(np.int32)
-        return ArmPoses(screws.pose(motions), status)
-
-    def error_twists(self, pose: ArrayLike, actuators: ArrayLike) -> FloatArray:
-        """Turning of the tool, then velocity of its origin, by each number: (N, 6, p).
-
-        In base axes, at joint coordinates `actuators` (N, n); an arm needs no pose.
-        """
-        by_errors = self.arm.error_jacobian(actuators, frame="tip")
-        if self.arm.laws is None:
-            return by_errors
-        return np.concatenate([by_errors, self.arm.law_jacobian(actuators, "tip")], axis=-1)
-
-    def actuator_twists(self, pose: ArrayLike, actuators: ArrayLike) -> FloatArray:
-        """Return the tool's twists by each joint coordinate, (N, 6, n)."""
-        return self.arm.jacobian(actuators, frame="tip")
-
-    def commanded(self, places: ArrayLike) -> tuple[FloatArray, FloatArray, tuple[int, ...]]:
-        """Pose, coordinates and batch shape of joint coordinates (..., n)."""
-        q, shape = as_rows("poses", places, self.n_actuators)
-        return self.forward(q).pose, q, shape
-
-
 def as_machine(robot: Robot | SerialArm | ArmMachine) -> Calibratable:
     """The robot itself, or an arm through its adapter."""
     if isinstance(robot, SerialArm):
@@ -236,3 +214,15 @@ def as_machine(robot: Robot | SerialArm | ArmMachine) -> Calibratable:
 def as_given(machine: Calibratable) -> Robot | SerialArm:
     """The reverse of `as_machine`: what the user gave, an arm as an arm."""
     return machine.arm if isinstance(machine, ArmMachine) else instance("robot", machine, Robot)
+
+
+def as_parallel(machine: Calibratable | SerialArm) -> Robot | None:
+    """The machine where it is parallel; None of an arm, for what only closed loops have."""
+    return machine if isinstance(machine, Robot) else None
+
+
+def as_arm(machine: Calibratable | SerialArm) -> SerialArm | None:
+    """The arm where the machine is one; None of a parallel machine."""
+    if isinstance(machine, SerialArm):
+        return machine
+    return machine.arm if isinstance(machine, ArmMachine) else None

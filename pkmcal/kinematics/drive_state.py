@@ -8,8 +8,6 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.geometry.carried import Load
-from pkmcal.kinematics.calibratable import ArmMachine
-from pkmcal.kinematics.robot import Robot
 
 M = TypeVar("M")
 
@@ -37,12 +35,12 @@ class DriveState(NamedTuple):
         return DriveState(*(None if each is None else each[rows] for each in self))
 
     def of(self, machine: M) -> M:
-        """The machine in this state: a robot, or an arm, on which tension does nothing."""
+        """The machine in this state; one without drives, as a user may make, follows none."""
         found: Any = machine
-        if isinstance(found, Robot | ArmMachine) and self.approach is not None:
+        if self.approach is not None:
             found = found.approaching(self.approach)
-        if isinstance(found, Robot) and self.tension is not None:
+        if self.tension is not None:
             found = found.tensioned(self.tension)
-        if isinstance(found, Robot | ArmMachine) and self.load is not None and found.yields:
+        if self.load is not None and found.yields:
             found = found.under(Load.of_rows(self.load))
         return cast(M, found)

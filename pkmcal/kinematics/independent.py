@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, first_largest
+from pkmcal.arrays import TIED, FloatArray, first_largest
 from pkmcal.geometry.elastic import is_kinematic
 from pkmcal.kinematics.robot import Robot
 
 INDEPENDENT = 1e-7  # least part of a number's effect that the others cannot have
-_ALIKE = 1e-6  # share by which effects differ that are not equal
 POSES = 40  # at least
 _HALVINGS = 8
 _KNOWN = ("gain", "drive")  # better than what an arm of a machine is
@@ -64,7 +63,7 @@ def _independent(columns: FloatArray) -> list[int]:
         size[found] = 0.0
         if not size.max() > least:
             break
-        found.append(first_largest(size, _ALIKE * float(size.max())))
+        found.append(first_largest(size, TIED * float(size.max())))
         along = left[:, found[-1]] / size[found[-1]]
         left -= np.outer(along, along @ left)
     return found

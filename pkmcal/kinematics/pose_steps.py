@@ -15,6 +15,7 @@ from pkmcal.arrays import FloatArray, IntArray, Unit, mm_per_unit
 from pkmcal.core.driven import DrivenMachine
 from pkmcal.core.library import COORDINATE_UNITS
 from pkmcal.geometry.limb_kinds import KINDS
+from pkmcal.kinematics.calibratable import Calibratable, as_parallel
 from pkmcal.kinematics.robot import Robot
 
 _DEPENDENT = 1e-2  # of unit rows: what errors of the geometry make of rows that depend
@@ -44,14 +45,15 @@ class RowRoles:
     surplus: int
 
 
-def surplus(robot: Robot) -> int:
+def surplus(machine: Calibratable) -> int:
     """Return the number of actuators beyond the platform's degrees of freedom.
 
     What they read can contradict itself. Closures beyond the free coordinates alone do not make it:
     of an over-constrained machine they are those of passive joints, which give way, and the pose
-    follows from that. None where chains share passive joints or carry a tail.
+    follows from that. None where chains share passive joints or carry a tail, and none of arms.
     """
-    if robot.machine.rows <= robot.machine.m:
+    robot = as_parallel(machine)
+    if robot is None or robot.machine.rows <= robot.machine.m:
         return 0
     chains = robot.model.chains
     apart = chains is None or not (chains.layout.shared or chains.tail)

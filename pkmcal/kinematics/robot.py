@@ -8,16 +8,16 @@ from dataclasses import fields, replace
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal import arguments
 from pkmcal.arguments import instance, whole
-from pkmcal.arrays import FloatArray, as_rows, wrapped
+from pkmcal.arrays import FloatArray, Unit, as_rows, wrapped
 from pkmcal.core.chains import ChainMachine
-from pkmcal.core.library import POSE
+from pkmcal.core.library import COORDINATE_UNITS, POSE
 from pkmcal.core.poses import rates_of_twists
 from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError
@@ -59,6 +59,8 @@ class Robot(Kinematics, Result):
 
     # what it is -----------------------------------------------------------------------------------
 
+    kind: Literal["parallel"] = "parallel"
+
     @property
     def name(self) -> str:
         """The robot's name."""
@@ -73,6 +75,15 @@ class Robot(Kinematics, Result):
     def actuator_units(self) -> tuple[str, ...]:
         """Unit of each actuator coordinate, "mm" or "rad"."""
         return self.model.actuator_units
+
+    @property
+    def commands(self) -> Mapping[str, Unit]:
+        """Name and unit of what a user commands: the coordinates of the pose."""
+        return COORDINATE_UNITS
+
+    def as_commands(self, pose: FloatArray, actuators: FloatArray) -> FloatArray:
+        """Return the poses: what a user commands to have these poses by these coordinates."""
+        return pose
 
     def __copy__(self) -> Robot:
         """Copy the machine without what was computed of it: nothing is built anew."""

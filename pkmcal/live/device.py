@@ -5,15 +5,36 @@ A kind of machine or instrument is one file with one class, named in `registry`.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import ClassVar, NamedTuple, Protocol
 
 from pkmcal.arrays import FloatArray
 from pkmcal.exceptions import Error
 from pkmcal.kinematics.robot import Robot
 
+FARTHEST = 1e5  # mm, rad; a reading beyond it is a mistake of who sent or typed it
+
 
 class DeviceError(Error):
     """A machine or an instrument does not answer, or refuses; says which and why."""
+
+
+@contextmanager
+def understood(what: str) -> Iterator[None]:
+    """Say that an answer has another form than its maker's pages give it.
+
+    Raises
+    ------
+    DeviceError
+        In place of what Python says of an entry that is missing or of another type.
+    """
+    try:
+        yield
+    except Error:
+        raise
+    except (LookupError, TypeError, AttributeError, ValueError) as error:
+        raise DeviceError(f"{what}: an answer that is not understood: {error!r}") from None
 
 
 class Where(NamedTuple):

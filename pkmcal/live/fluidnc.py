@@ -14,11 +14,12 @@ import numpy as np
 from pkmcal.arrays import FloatArray
 from pkmcal.kinematics.robot import Robot
 from pkmcal.live.address import host_and_port
-from pkmcal.live.device import DeviceError, Where, require_translations
+from pkmcal.live.device import DeviceError, Where, require_translations, understood
 from pkmcal.live.lines import Lines
 
 _TELNET = 23
 _MOVE, _PAUSE = 600.0, 0.1  # s that a move may take, and between questions
+_RESTS = 10  # looks at rest after which a move that has not arrived has ended elsewhere
 _THERE = 0.02  # mm that a place may differ from the command by; three decimals are printed
 _STATUS = re.compile(r"<(?P<state>\w+)[^|>]*(?P<rest>[^>]*)>")
 _PLACE = re.compile(r"\|MPos:([-\d.,]+)")
@@ -61,15 +62,18 @@ class FluidNC:
             f"{axis}{value:.4f}" for axis, value in zip("XYZ"[: self._axes], pose, strict=False)
         )
         self._command(f"G21 G90 G53 G1 {words} F{feed:.1f}")
-        end = monotonic() + _MOVE
+        end, idle = monotonic() + _MOVE, 0
         while True:
             state, place = self._status()
             if state not in ("Idle", "Run"):
                 raise DeviceError(f"the machine is {state} in a move")
-            if state == "Idle" and place is not None:
-                off = np.abs(place[: self._axes] - pose[: self._axes]).max()
-                if off < _THERE:
-                    return
+            if place is None:
+                raise DeviceError("its status says no MPos in a move: set $10=1")
+            off = np.abs(place[: self._axes] - pose[: self._axes]).max()
+            idle = idle + 1 if state == "Idle" else 0  # a move may not have begun yet
+            if idle and off < _THERE:
+                return
+            if idle > _RESTS:
                 raise DeviceError(f"the machine stopped {off:.3f} mm from where it was to go")
             if monotonic() > end:
                 raise DeviceError(f"the machine is not there after {_MOVE:g} s")
@@ -93,16 +97,27 @@ class FluidNC:
         self._lines.close()
 
     def _command(self, line: str) -> None:
-        self._lines.send(line)
-        while (said := self._lines.line()) != "ok":
+        def taken(said: str) -> bool | None:
             if said.startswith(("error", "ALARM")):
                 raise DeviceError(f"FluidNC refuses {line!r}: {said}")
+            return said == "ok" or None
+
+        self._lines.send(line)
+        self._lines.answer(taken)
 
     def _status(self) -> tuple[str, FloatArray | None]:
-        self._lines.send(b"?")
-        while (found := _STATUS.fullmatch(said := self._lines.line())) is None:
+        def taken(said: str) -> re.Match[str] | None:
             if said.startswith("ALARM"):
                 raise DeviceError(f"FluidNC: {said}")
+            return _STATUS.fullmatch(said)
+
+        self._lines.send(b"?")
+        found = self._lines.answer(taken)
         place = _PLACE.search(found["rest"])
-        numbers = None if place is None else np.array([float(x) for x in place[1].split(",")])
+        if place is None:
+            return found["state"], None
+        with understood(f"FluidNC, {found[0]}"):
+            numbers = np.array([float(x) for x in place[1].split(",")])
+        if len(numbers) < self._axes:
+            raise DeviceError(f"FluidNC says {len(numbers)} axes: {found[0]}")
         return found["state"], numbers

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
 from time import monotonic, sleep
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,8 +16,20 @@ from pkmcal.live.device import DeviceError
 
 _WAIT, _PAUSE = 600.0, 0.1  # s for a reading, and between two looks
 _LONGEST = 100_000_000  # bytes of a file
+_LAST = 4096  # bytes before its end by which a file is known again
 _SEPARATORS = re.compile(r"[;,\t ]+")
 _NUMBER = re.compile(r"[-+]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?")
+
+
+class _Known(NamedTuple):
+    """A file as it was: its size, when it was changed, and its last bytes."""
+
+    size: int
+    changed: int
+    last: bytes
+
+
+_NONE = _Known(0, 0, b"")
 
 
 class WatchedFolder:
@@ -34,41 +48,64 @@ class WatchedFolder:
 
     def read(self, wanted: str) -> FloatArray:
         """The line that is added next."""
-        before, end = self._sizes(), monotonic() + _WAIT
+        before, end = self._files(), monotonic() + _WAIT
+        seen: dict[Path, list[str]] = {}
         while monotonic() < end:
-            for path, size in self._sizes().items():
-                known = before.get(path, 0)
-                if size < known:  # written anew
-                    before[path] = 0
+            for path in self._paths():
+                try:
+                    added = self._added(path, before.get(path, _NONE))
+                except FileNotFoundError:  # it vanished meanwhile
                     continue
-                added = self._added(path, known)
-                if added:
+                except OSError as error:
+                    raise DeviceError(f"folder: {error}") from None
+                if added and seen.get(path) == added:  # nothing more comes with it
                     return self._numbers(path, added)
+                seen[path] = added
             sleep(_PAUSE)
         raise DeviceError(f"folder: nothing was added in {self._folder} for {_WAIT:g} s")
 
     def close(self) -> None:
         """Nothing is open."""
 
-    def _sizes(self) -> dict[Path, int]:
-        """Files by their size; those that vanish meanwhile are none."""
+    def _paths(self) -> list[Path]:
+        try:
+            files = sorted(self._folder.iterdir())
+        except OSError as error:
+            raise DeviceError(f"folder: {error}") from None
+        kinds = (".csv", ".txt", ".tsv", ".log", ".asc", ".xyz")
+        return [path for path in files if path.suffix.lower() in kinds]
+
+    def _files(self) -> dict[Path, _Known]:
+        """Files as they are; those that vanish meanwhile are none."""
         found = {}
-        for path in sorted(self._folder.iterdir()):
-            if path.suffix.lower() in (".csv", ".txt", ".tsv", ".log", ".asc", ".xyz"):
-                try:
-                    found[path] = path.stat().st_size
-                except OSError:
-                    continue
+        for path in self._paths():
+            try:
+                with open(path, "rb") as file:
+                    stat = os.fstat(file.fileno())
+                    file.seek(max(0, stat.st_size - _LAST))
+                    last = file.read(min(_LAST, stat.st_size))
+            except OSError:
+                continue
+            found[path] = _Known(stat.st_size, stat.st_mtime_ns, last)
         return found
 
-    def _added(self, path: Path, known: int) -> list[str]:
-        """Whole lines behind what is known; a heading of a new file is none."""
+    def _added(self, path: Path, known: _Known) -> list[str]:
+        """Whole lines behind what is known, or all of a file that was written anew.
+
+        A heading of a new file is none.
+        """
         with open(path, "rb") as file:
-            file.seek(known)
+            stat = os.fstat(file.fileno())
+            if (stat.st_size, stat.st_mtime_ns) == known[:2]:
+                return []
+            file.seek(max(0, known.size - len(known.last)))
+            if file.read(len(known.last)) != known.last:  # another file, or written anew
+                known = _NONE
+                file.seek(0)
             content = file.read(_LONGEST)
         whole, end, _ = content.rpartition(b"\n")
         lines = [line.strip() for line in (whole + end).decode("utf-8", "replace").splitlines()]
-        return [line for line in lines if line and not (known == 0 and _is_heading(line))]
+        return [line for line in lines if line and not (known.size == 0 and _is_heading(line))]
 
     def _numbers(self, path: Path, lines: list[str]) -> FloatArray:
         if len(lines) > 1:

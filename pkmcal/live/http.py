@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 import urllib.error
 import urllib.parse
 import urllib.request
@@ -13,6 +14,20 @@ from pkmcal.live.device import DeviceError
 
 _LONGEST = 1_000_000  # bytes of an answer
 _WAIT = 10.0  # s, of a question; a move has its own
+
+
+class RefusedError(DeviceError):
+    """A server answers with an error.
+
+    Attributes
+    ----------
+    code : int
+        That of HTTP, such as 401.
+    """
+
+    def __init__(self, message: str, code: int) -> None:
+        super().__init__(message)
+        self.code = code
 
 
 class _NoRedirect(urllib.request.HTTPRedirectHandler):
@@ -52,7 +67,7 @@ class Server:
         text = self.text(path, method, wait, **query)
         try:
             found = json.loads(text)
-        except ValueError:
+        except (ValueError, RecursionError):
             found = None
         if not isinstance(found, dict):
             raise DeviceError(f"{self._what}: its answer is no JSON object: {text[:80]!r}")
@@ -64,21 +79,30 @@ class Server:
         Raises
         ------
         DeviceError
-            No answer, an error, or an answer that is too long.
+            No answer, an error, or an answer that is too long or takes too long.
         """
+        end = time.monotonic() + wait
         asked = f"?{urllib.parse.urlencode(query)}" if query else ""
         request = urllib.request.Request(
             self.address + path + asked, method=method, headers=self.headers
         )
         try:
             with self._open(request, timeout=wait) as answer:
-                found: bytes = answer.read(_LONGEST + 1)
+                found = b""
+                while len(found) <= _LONGEST and (some := answer.read1(_LONGEST)):
+                    found += some
+                    if time.monotonic() > end:
+                        raise TimeoutError("its answer does not end")
+                if len(found) <= _LONGEST and answer.length:
+                    raise DeviceError(f"{self._what} broke off: half an answer")
         except urllib.error.HTTPError as error:
             with error:
-                raise DeviceError(f"{self._what}: {_said(error)}") from None
+                raise RefusedError(f"{self._what}: {_said(error)}", error.code) from None
         except (OSError, ValueError, urllib.error.URLError) as error:
             reason = getattr(error, "reason", None) or error
             raise DeviceError(f"{self._what} does not answer: {reason}") from None
+        except DeviceError:
+            raise
         except Exception as error:  # of http.client: half an answer, a line that is none
             raise DeviceError(f"{self._what} broke off: {error or type(error).__name__}") from None
         if len(found) > _LONGEST:

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import socket
 import time
+from collections.abc import Callable
+from typing import TypeVar
 
 from pkmcal.live.device import DeviceError
 
 _LONGEST = 100_000  # bytes without the end of a line
+_T = TypeVar("_T")
 
 
 class Lines:
@@ -73,6 +76,24 @@ class Lines:
             self._rest += some
         line, self._rest = self._rest.split(b"\n", 1)
         return line.decode("utf-8", "replace").strip()
+
+    def answer(self, taken: Callable[[str], _T | None]) -> _T:
+        """What the first line that is an answer says; others are passed over, for a time.
+
+        Parameters
+        ----------
+        taken : callable
+            Returns what a line says, None of one that is no answer; may raise.
+
+        Raises
+        ------
+        DeviceError
+            None comes in time, or the connection is gone.
+        """
+        end = time.monotonic() + self._wait
+        while (found := taken(self.line(end - time.monotonic()))) is None:
+            continue
+        return found
 
     def close(self) -> None:
         """Close the connection."""

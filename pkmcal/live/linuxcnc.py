@@ -13,7 +13,7 @@ from pkmcal.arrays import FloatArray
 from pkmcal.core.library import POSE
 from pkmcal.kinematics.robot import Robot
 from pkmcal.live.address import host_and_port
-from pkmcal.live.device import DeviceError, Where
+from pkmcal.live.device import DeviceError, Where, understood
 from pkmcal.live.lines import Lines
 
 _PORT = 5007
@@ -60,7 +60,8 @@ class LinuxCNC:
         while True:
             if self._get("machine") != "ON":
                 raise DeviceError("LinuxCNC went off in a move")
-            off = np.abs(self._numbers("abs_act_pos")[self._axes] - wanted[self._axes]).max()
+            place = self._numbers("abs_act_pos", max(self._axes) + 1)
+            off = np.abs(place[self._axes] - wanted[self._axes]).max()
             idle = idle + 1 if self._get("program_status") == "IDLE" else 0
             if idle and off < _THERE:
                 return
@@ -74,11 +75,12 @@ class LinuxCNC:
 
     def where(self) -> Where:
         """Its coordinates, and its joints as they are."""
-        place = self._numbers("abs_act_pos")
+        place = self._numbers("abs_act_pos", max(self._axes) + 1)
         pose = np.full(6, np.nan)
         pose[self._axes] = place[self._axes]
         pose[3:] = np.radians(pose[3:])
-        joints = self._numbers("joint_pos")[: self._robot.n_actuators]
+        count = self._robot.n_actuators
+        joints = self._numbers("joint_pos", count)[:count]
         turned = np.array([unit == "rad" for unit in self._robot.actuator_units])
         return Where(pose, np.where(turned, np.radians(joints), joints))
 
@@ -99,21 +101,30 @@ class LinuxCNC:
         _set(self._lines, words)
 
     def _get(self, name: str) -> str:
-        self._lines.send(f"get {name}")
-        while not (said := self._lines.line()).upper().startswith(name.upper()):
+        def taken(said: str) -> str | None:
+            if said.upper().startswith(name.upper()):
+                return said[len(name) :].strip()
             if "NAK" in said:
                 raise DeviceError(f"LinuxCNC does not say {name}: {said}")
-        return said[len(name) :].strip()
+            return None
 
-    def _numbers(self, name: str) -> FloatArray:
-        return np.array([float(each) for each in self._get(name).split()])
+        self._lines.send(f"get {name}")
+        return self._lines.answer(taken)
+
+    def _numbers(self, name: str, least: int) -> FloatArray:
+        with understood(f"LinuxCNC, {name}"):
+            numbers = np.array([float(each) for each in self._get(name).split()])
+        if len(numbers) < least:
+            raise DeviceError(f"LinuxCNC says {len(numbers)} numbers of {name}")
+        return numbers
 
 
 def _greet(lines: Lines) -> None:
     connect, enable = _PASSWORDS
     lines.send(f"hello {connect} pkmcal 1.0")
-    while "HELLO" not in (said := lines.line()).upper().split(maxsplit=1)[:1]:
-        continue
+    said = lines.answer(
+        lambda line: line if "HELLO" in line.upper().split(maxsplit=1)[:1] else None
+    )
     if "ACK" not in said:
         raise DeviceError(f"linuxcncrsh refuses: {said}")
     lines.send("set echo off")
@@ -124,7 +135,8 @@ def _greet(lines: Lines) -> None:
 def _set(lines: Lines, words: str) -> None:
     lines.send(f"set {words}")
     name = f"SET {words.split()[0].upper()}"
-    while not (said := lines.line()).startswith((f"{name} ACK", f"{name} NAK")):
-        continue
+    said = lines.answer(
+        lambda line: line if line.startswith((f"{name} ACK", f"{name} NAK")) else None
+    )
     if said.endswith("NAK"):
         raise DeviceError(f"LinuxCNC refuses {words!r}")

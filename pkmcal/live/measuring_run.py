@@ -10,7 +10,6 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import suppress
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -20,12 +19,13 @@ from pkmcal.arrays import FloatArray
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.robot import Robot
 from pkmcal.live.course import Course
-from pkmcal.live.device import DeviceError, Instrument, Machine
+from pkmcal.live.device import FARTHEST, DeviceError, Instrument, Machine
 from pkmcal.live.row_log import RowLog
 
 _THERE, _TURNED = 0.02, 1e-3  # mm and rad by which a controller may be off the pose asked for
 _SAME = 0.5  # mm by which its drives may be off its place by the robot file
-_STEP, _LEAST = 5.0, 8  # mm between points of a way that are looked at, and how many at least
+_STEP = 5.0  # mm between points of a way that are looked at
+_LEAST, _MOST = 8, 4000  # how many at least; a way with more leaves the limits
 _DONE = 0.1  # mm, and 1e-3 rad: a row so near to a candidate is of it
 
 
@@ -108,9 +108,9 @@ class MeasuringRun:
                 self._drive(place)
             self._wait(self._rules.dwell)
             actuators = self._arrived(pose)
-            values = self._read(f"row {_count(course) + 1}, at {_words(pose)}")
+            values = self._read(f"row {_count(course) + 1}, at {pose_words(pose)}")
             if values is None:
-                self._tell(f"at {_words(pose)} nothing was seen: no row, and not again")
+                self._tell(f"at {pose_words(pose)} nothing was seen: no row, and not again")
                 course = course.without(index)
                 continue
             self._log.append(actuators, values, round(time.time(), 1))
@@ -125,6 +125,19 @@ class MeasuringRun:
         if self._moving.is_set():
             self._machine.stop()
 
+    def _end_of_move(self) -> None:
+        """Stop the machine, also where Ctrl-C comes once more before it has heard."""
+
+        def stop() -> None:
+            try:
+                self._machine.stop()
+            except DeviceError as error:
+                self._tell(f"the machine did not take the stop, stop it by hand: {error}")
+
+        stopping = threading.Thread(target=stop)
+        stopping.start()
+        stopping.join()
+
     def _drive(self, pose: FloatArray) -> None:
         """One straight move within the limits."""
         self._require_running()
@@ -135,8 +148,7 @@ class MeasuringRun:
             self._require_running()  # else it was stopped, and that is what it says
             raise
         except BaseException:  # Ctrl-C while it moves
-            with suppress(DeviceError):
-                self._machine.stop()
+            self._end_of_move()
             raise
         finally:
             self._moving.clear()
@@ -177,7 +189,7 @@ class MeasuringRun:
 
     def _require_within(self, start: FloatArray, end: FloatArray) -> None:
         """Refuse a move that leaves strokes, cones or the box; where it began may be outside."""
-        points = max(_LEAST, int(np.abs(end - start)[:3].max() / _STEP))
+        points = int(np.clip(np.abs(end - start)[:3].max() / _STEP, _LEAST, _MOST))
         share = np.linspace(0.0, 1.0, points + 1)[1:, None]
         way = start + share * (end - start)
         inside = self._robot.feasible(way).ok
@@ -185,8 +197,8 @@ class MeasuringRun:
         first = int(np.argmax(inside)) if not began else 0  # it may come in from outside
         if not inside[first:].all() or not inside[-1]:
             raise ArgumentError(
-                f"the way from {_words(start)} to {_words(end)} leaves the limits of"
-                f" {self._robot.name} at {_words(way[first:][~inside[first:]][0])}: choose"
+                f"the way from {pose_words(start)} to {pose_words(end)} leaves the limits of"
+                f" {self._robot.name} at {pose_words(way[first:][~inside[first:]][0])}: choose"
                 " --safe-height, --within or --poses"
             )
 
@@ -200,9 +212,9 @@ class MeasuringRun:
         off = np.abs(found - said.pose)[known]
         if not np.isfinite(off).all() or off[:3].max() > _SAME:
             raise DeviceError(
-                f"the controller says it is at {_words(said.pose)}, and its drives are at"
-                f" {_words(found)} by the robot file: it is not the machine of this file, or its"
-                " numbers have changed; import its configuration again"
+                f"the controller says it is at {pose_words(said.pose)}, and its drives are at"
+                f" {pose_words(found)} by the robot file: it is not the machine of this file, or"
+                " its numbers have changed; import its configuration again"
             )
 
     def _arrived(self, pose: FloatArray) -> FloatArray:
@@ -213,8 +225,8 @@ class MeasuringRun:
             off = np.where(np.isfinite(off), off, 0.0)
             if off[:3].max() > _THERE or off[3:].max() > _TURNED:
                 raise DeviceError(
-                    f"sent to {_words(pose)}, the controller is at {_words(said.pose)}: an offset"
-                    " or a mesh bends its moves; switch it off"
+                    f"sent to {pose_words(pose)}, the controller is at {pose_words(said.pose)}:"
+                    " an offset or a mesh bends its moves; switch it off"
                 )
         if said.actuators is not None:
             return said.actuators
@@ -232,6 +244,11 @@ class MeasuringRun:
             found.append(self._instrument.read(wanted + which))
         self._require_running()
         seen = np.array(found)
+        if (np.abs(seen) > FARTHEST).any():  # NaN is not
+            raise DeviceError(
+                f"at {wanted} the instrument reads {seen[np.abs(seen) > FARTHEST][0]:g}: no such"
+                " place is near"
+            )
         seen = seen[np.isfinite(seen).all(axis=1)]
         return seen if len(seen) else None
 
@@ -262,7 +279,7 @@ def _count(course: Course) -> int:
     return 0 if course.rows is None else len(course.rows)
 
 
-def _words(pose: FloatArray) -> str:
+def pose_words(pose: FloatArray) -> str:
     """A pose in words, without what it does not have."""
     shown = np.r_[pose[:3], np.degrees(pose[3:])]
     names = ("x", "y", "z", "alpha", "beta", "gamma")

@@ -14,9 +14,10 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray
 from pkmcal.kinematics.robot import Robot
-from pkmcal.live.device import DeviceError, Where, require_translations
+from pkmcal.live.device import DeviceError, Where, require_translations, understood
 from pkmcal.live.http import Server
 
+_STRAIGHT = 0.01  # mm by which a commanded place may differ from that of the toolhead at rest
 _MOVE = 600.0  # s that a move may take
 _SAID = 100  # answers that are looked through for that of GET_POSITION
 _ASKED, _TRIED, _PAUSE = 5, 20, 0.05  # how often it is asked and looked for, and s between
@@ -39,24 +40,51 @@ class Moonraker:
         self._server, self._robot = Server(address, "Moonraker"), robot
 
     def require_ready(self) -> None:
-        """Raise a `DeviceError` unless Klipper is ready, homed, and prints nothing."""
+        """Raise a `DeviceError` unless Klipper is ready, homed, straight, and prints nothing."""
         info = self._result("/printer/info")
         if info.get("state") != "ready":
             said = " ".join(str(info.get("state_message", "")).split())
             raise DeviceError(f"the printer is {info.get('state')}: {said}")
-        status = self._result(
-            "/printer/objects/query", toolhead="homed_axes", print_stats="state"
-        ).get("status", {})
-        homed = status.get("toolhead", {}).get("homed_axes", "")
-        if set(homed) < set("xyz"):
+        status = self._status(toolhead="homed_axes", print_stats="state")
+        with understood("Moonraker, toolhead and print_stats"):
+            homed = str(status["toolhead"]["homed_axes"])
+            prints = status.get("print_stats", {}).get("state") in ("printing", "paused")
+        if not set(homed) >= set("xyz"):
             raise DeviceError(
                 "the printer is not homed: home it (G28), and see that nothing is in its way"
             )
-        if status.get("print_stats", {}).get("state") in ("printing", "paused"):
+        if prints:
             raise DeviceError("the printer prints: wait until it has ended")
+        self._require_straight()
+
+    def _require_straight(self) -> None:
+        """Refuse whatever would make a move end elsewhere, or be faster, than it is told.
+
+        Raises
+        ------
+        DeviceError
+            An offset (SET_GCODE_OFFSET, G92), a mesh, or a speed factor (M220).
+        """
+        status = self._status(toolhead="position", gcode_move="", bed_mesh="profile_name")
+        with understood("Moonraker, toolhead and gcode_move"):
+            told = status["gcode_move"]
+            there = np.array(status["toolhead"]["position"][:3], dtype=np.float64)
+            off = np.abs(np.array(told["gcode_position"][:3], dtype=np.float64) - there)
+            speed = float(told["speed_factor"])
+            mesh = str((status.get("bed_mesh") or {}).get("profile_name") or "")
+        if not off.max() < _STRAIGHT or len(off) != 3:
+            raise DeviceError(
+                f"an offset or a mesh bends its moves by {off.max():.3f} mm: clear it"
+                " (SET_GCODE_OFFSET X=0 Y=0 Z=0, BED_MESH_CLEAR; after G92, G28)"
+            )
+        if mesh:
+            raise DeviceError(f"the mesh {mesh!r} bends its moves: clear it (BED_MESH_CLEAR)")
+        if not abs(speed - 1.0) < 1e-6:
+            raise DeviceError(f"the printer moves {speed:g} times as fast as told: M220 S100")
 
     def go(self, pose: FloatArray, feed: float) -> None:
         """Drive straight to a place, in absolute coordinates, and wait until it is there."""
+        self._require_straight()  # somebody else may have set one meanwhile
         x, y, z = pose[:3]
         self._run(
             "SAVE_GCODE_STATE NAME=pkmcal\nG90\n"
@@ -104,8 +132,15 @@ class Moonraker:
         raise DeviceError("the printer did not answer GET_POSITION")
 
     def _answers(self) -> list[tuple[float, str]]:
-        stored = self._result("/server/gcode_store", count=_SAID).get("gcode_store", [])
-        return [(float(each["time"]), str(each["message"])) for each in stored]
+        stored = self._result("/server/gcode_store", count=_SAID)
+        with understood("Moonraker, gcode_store"):
+            return [(float(each["time"]), str(each["message"])) for each in stored["gcode_store"]]
+
+    def _status(self, **query: str) -> dict[str, Any]:
+        found = self._result("/printer/objects/query", **query).get("status")
+        if not isinstance(found, dict):
+            raise DeviceError("Moonraker: /printer/objects/query has no status")
+        return found
 
     def _result(self, path: str, **query: Any) -> dict[str, Any]:
         found = self._server.ask(path, **query).get("result")

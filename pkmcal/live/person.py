@@ -10,7 +10,7 @@ from pkmcal.arrays import FloatArray
 from pkmcal.display import visible
 from pkmcal.files.number_text import typed
 from pkmcal.kinematics.robot import Robot
-from pkmcal.live.device import DeviceError, Where
+from pkmcal.live.device import FARTHEST, DeviceError, Where
 
 Ask = Callable[[str], str]  # prints a question and returns what is typed; EOFError: nobody there
 
@@ -22,7 +22,7 @@ def _ask(question: str) -> str:
 class PersonDrives:
     """A machine that a person drives to each pose."""
 
-    ADDRESS = ""
+    ADDRESS, ASKS = "", True
 
     def __init__(self, address: str, robot: Robot, ask: Ask = _ask) -> None:
         self._axes, self._ask = robot.coordinates, ask
@@ -55,7 +55,7 @@ class PersonDrives:
 class PersonReads:
     """An instrument that a person reads and types: numbers in mm and deg, or - for nothing."""
 
-    ADDRESS = ""
+    ADDRESS, ASKS = "", True
 
     def __init__(self, address: str, units: tuple[str, ...], ask: Ask = _ask) -> None:
         self._units, self._ask = units, ask
@@ -71,7 +71,7 @@ class PersonReads:
                 numbers = [typed(each) for each in said.replace(",", " ").split()]
             except ValueError:
                 numbers = []
-            if len(numbers) == count and np.isfinite(numbers).all():
+            if len(numbers) == count and (np.abs(numbers) <= FARTHEST).all():
                 turned = np.array([unit == "rad" for unit in self._units])
                 return np.where(turned, np.radians(numbers), numbers)
             one = "a number" if count == 1 else f"{count} numbers"

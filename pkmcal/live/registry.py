@@ -12,7 +12,7 @@ from pkmcal.live.fluidnc import FluidNC
 from pkmcal.live.folder import WatchedFolder
 from pkmcal.live.linuxcnc import LinuxCNC
 from pkmcal.live.moonraker import Moonraker
-from pkmcal.live.person import PersonDrives, PersonReads
+from pkmcal.live.person import Ask, PersonDrives, PersonReads
 from pkmcal.live.reprap import RepRap
 from pkmcal.live.serial_gauge import SerialGauge
 
@@ -30,8 +30,8 @@ INSTRUMENTS: dict[str, Any] = {
 }
 
 
-def machine(text: str, robot: Robot) -> Machine:
-    """The machine that ``WORD:ADDRESS`` states, connected.
+def machine(text: str, robot: Robot, ask: Ask | None = None) -> Machine:
+    """The machine that ``WORD:ADDRESS`` states, connected; `ask` asks people, else a terminal.
 
     Raises
     ------
@@ -41,12 +41,12 @@ def machine(text: str, robot: Robot) -> Machine:
         It does not answer.
     """
     kind, address = _stated("--machine", text, MACHINES)
-    made: Machine = kind(address, robot)
+    made: Machine = kind(address, robot, *_asking(kind, ask))
     return made
 
 
-def instrument(text: str, units: tuple[str, ...]) -> Instrument:
-    """The instrument that ``WORD:ADDRESS`` states, opened.
+def instrument(text: str, units: tuple[str, ...], ask: Ask | None = None) -> Instrument:
+    """The instrument that ``WORD:ADDRESS`` states, opened; `ask` as of `machine`.
 
     Raises
     ------
@@ -56,13 +56,17 @@ def instrument(text: str, units: tuple[str, ...]) -> Instrument:
         It is not there.
     """
     kind, address = _stated("--instrument", text, INSTRUMENTS)
-    made: Instrument = kind(address, units)
+    made: Instrument = kind(address, units, *_asking(kind, ask))
     return made
 
 
 def words(kinds: dict[str, Any]) -> str:
     """The words with their addresses, for help."""
     return ", ".join(f"{word}:{of.ADDRESS}" if of.ADDRESS else word for word, of in kinds.items())
+
+
+def _asking(kind: Any, ask: Ask | None) -> tuple[Ask, ...]:
+    return (ask,) if ask is not None and getattr(kind, "ASKS", False) else ()
 
 
 def _stated(option: str, text: str, kinds: dict[str, Any]) -> tuple[Any, str]:

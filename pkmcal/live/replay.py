@@ -33,7 +33,7 @@ def places(robot: Robot | SerialArm, log: Measurements) -> tuple[FloatArray, lis
     index = log.pose_index
     rows = [np.flatnonzero(index == i) for i in dict.fromkeys(index.tolist())]
     at = log.actuators[[own[0] for own in rows]]
-    if isinstance(robot, SerialArm):
+    if as_machine(robot).kind == "arm":
         return at, rows
     poses = as_machine(robot).forward(at).pose
     none = np.flatnonzero(~np.isfinite(poses).all(axis=1))

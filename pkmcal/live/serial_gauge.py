@@ -18,10 +18,10 @@ from pkmcal.live.device import DeviceError
 
 _BAUD = 9600
 _WAIT = 60.0  # s for a reading: a button may have to be pressed
-_NEXT = 0.3  # s in which a gauge that sends by itself has sent its next line
+_SILENT = 0.1  # s without a byte, after which a line begins: converters send in lots of 16 ms
 _READING = re.compile(
-    rb"(?:\d{2}[A-Z](?=[+-]))?[A-Za-z=: ]{0,8}"
-    rb"(?P<number>[+-]? ?\d{1,6}(?:[.,]\d{1,6})?) ?(?P<unit>mm|in|\")?"
+    rb"(?:\d{2}[A-Z](?=[+-])|[A-Za-z]?[=: ]{0,3})"
+    rb"(?P<number>[+-]? ?\d{1,6}(?P<point>[.,]\d{1,6})?) ?(?P<unit>mm|in|\")?"
 )
 _INCH = 25.4
 
@@ -47,9 +47,13 @@ class SerialGauge:
             self._port.reset_input_buffer()
             if self._question:
                 self._port.write(f"{self._question}\r\n".encode())
+            first = b""
+            if not self._question:  # it may send by itself, and be in the middle of a line
+                self._port.timeout = _SILENT
+                first = self._port.read(1)
+            if first:
+                self._line(_WAIT, first)
             line = self._line(_WAIT)
-            if not self._question:  # the first may have begun before: of two the second is whole
-                line = self._line(_NEXT) or line
         except OSError as error:  # pyserial's are of this kind
             raise DeviceError(f"the gauge at {self._name} broke off: {error}") from None
         if not line:
@@ -60,9 +64,11 @@ class SerialGauge:
         """Close the port."""
         self._port.close()
 
-    def _line(self, wait: float) -> bytes:
+    def _line(self, wait: float, found: bytes = b"") -> bytes:
         """The next line with something in it; nothing where none ends in time."""
-        end, found = monotonic() + wait, b""
+        end = monotonic() + wait
+        if found in (b"\r", b"\n"):
+            return b""
         while (left := end - monotonic()) > 0.0:
             self._port.timeout = left
             byte = self._port.read(1)
@@ -75,7 +81,7 @@ class SerialGauge:
 
 def _number(line: bytes, name: str) -> float:
     found = _READING.fullmatch(line)
-    if found is None:
+    if found is None or not (found["point"] or found["unit"]):  # as in "ERR 2", "911"
         raise DeviceError(f"the gauge at {name} sends {line[:60]!r}, which is no single number")
     number = float(found["number"].replace(b",", b".").replace(b" ", b""))
     return number * (_INCH if found["unit"] in (b"in", b'"') else 1.0)

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 from pkmcal.arguments import words
 from pkmcal.arrays import FloatArray, Int64Array
 from pkmcal.exceptions import ArgumentError
+from pkmcal.files.column_names import known_as
 from pkmcal.files.csv_table import Table
 from pkmcal.files.csv_writer import WrittenColumn
 from pkmcal.readings.reading import Reading
@@ -41,6 +42,8 @@ class Field:
         None: names.
     blank : bool
         Whether cells of its one column may be empty: NaN then.
+    named : bool
+        Whether it has a column ``FIELD.NAME`` for every name that the user chooses.
     """
 
     name = ""
@@ -48,6 +51,7 @@ class Field:
     log_first = False
     unit: str | None = ""
     blank = False
+    named = False
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
@@ -123,23 +127,31 @@ def row_fields(measurements: type) -> Fields:
 
 
 @cache
-def require_other_columns(
-    reading: str, columns: tuple[tuple[str, str], ...], labels: tuple[str, ...], fields: Fields
-) -> None:
+def require_other_columns(reading: type[Reading], fields: Fields) -> None:
     """Refuse a class of readings with a component or a label that is a column of other things.
 
     Raises
     ------
     ValueError
-        Its name: that of a field of the rows, of an actuator or of a column of the table.
+        Its name: that of a field of the rows, of an actuator or of a column of the table; or one
+        that a file's heading would be read as another name for.
     """
-    components = [name for name, _ in columns]
+    components = [name for name, _ in reading.components]
     taken = {"row", *(name for each in fields for name in each.names((), components))}
-    for name in (*components, *labels):
+    for name in (*components, *reading.labels):
         if name in taken or re.fullmatch(r"q\d+", name):
             raise ArgumentError(
-                f"kind: {reading} calls a column {name!r}, which measurements have for"
+                f"kind: {reading.__name__} calls a column {name!r}, which measurements have for"
                 " something else; give it another name"
+            )
+    plain = components if reading.value_columns is Reading.value_columns else []
+    if reading.columns_in_file is Reading.columns_in_file and reading.columns is Reading.columns:
+        plain += reading.labels
+    for name in plain:
+        if (meant := known_as(name)) != name:
+            raise ArgumentError(
+                f"kind: {reading.__name__} calls a column {name!r}, which files have as another"
+                f" name for {meant!r}; give it another one"
             )
 
 

@@ -19,6 +19,7 @@ columns                               meaning
 ``actuator_sigma [mm]``               standard deviation of what every actuator read
 ``actuator_sigma.q1 [mm]`` …          … or of each of them
 ``KIND.FIELD``                        what an instrument of a class of your own has for all rows
+``beside.NAME``                       numbers of the rows for readings and effects of your own
 ``group``                             a whole number, the same for repeats of one pose
 ``session``                           when the row was measured, by a name
 ``time``                              when, in seconds or as a time-stamp
@@ -215,7 +216,7 @@ def read_measurements(
     actuators, units = read_actuators(table, robot)
     compare(table, units, robot)
     fill_in(table, robot, several)
-    read = with_constants(_reading(table, several, readings), table).read(table, units)
+    read = with_constants(_reading(table, several, readings, kind), table).read(table, units)
     fields = _read_fields(table, read, units)
     values: FloatArray | None
     if several:
@@ -357,22 +358,41 @@ def _known(
         names |= reading.names(table) | headings_of_constants(reading)
     for field in _FIELDS:
         names |= field.names(actuators, components)
-    return names
+    named = {field.name for field in _FIELDS if field.named}
+    return names | {name for name in table.columns if name.partition(".")[0] in named}
 
 
-def _reading(table: Table, several: tuple[str, ...], readings: Sequence[Reading]) -> Reading:
-    """Read the measured quantity, by the columns that are there."""
+def _reading(
+    table: Table, several: tuple[str, ...], readings: Sequence[Reading], own: Reading | None
+) -> Reading:
+    """Read the measured quantity, by the columns that are there; `own` has its columns first."""
     found: dict[str, Reading] = {}
+    if own is not None and (titles := own.found_in(table)):
+        found = dict.fromkeys(titles, own)
+        table = table.without(own.names(table))
+        readings = [each for each in readings if type(each) is not type(own)]
     for each in readings:
         for title in each.found_in(table):
-            if title in found and each in KINDS.values():  # one that the caller states comes first
+            if title in found:
                 raise table.header_error(f"{title}: {found[title].noun()} or {each.noun()}?")
             found[title] = each
     if several:
         found[f"several targets ({', '.join(several)})"] = Position()
     if len(found) > 1:
         raise table.header_error(f"more than one thing measured: {' and '.join(found)}")
+    if not found:
+        _require_nothing_measured(table)
     return next(iter(found.values()), Closure())
+
+
+def _require_nothing_measured(table: Table) -> None:
+    """Refuse a table whose unknown columns have units: they were measured, by something."""
+    if measured := [name for name, unit in table.left_out.items() if unit is not None]:
+        raise table.header_error(
+            f"nothing in it is known to be measured; column {measured[0]!r} is unknown: a reading"
+            " of a class of your own is named by kind=…, as kind=Loop(); without one, columns that"
+            f" do not matter are left out, --ignore {measured[0]!r} (ignore=)"
+        )
 
 
 def _read_values(

@@ -19,6 +19,7 @@ from pkmcal.files.understood import Understood
 from pkmcal.kinematics.drive_state import DriveState
 from pkmcal.measurements.actuator_sigma import ActuatorSigma
 from pkmcal.measurements.approach import Approach
+from pkmcal.measurements.beside import Beside
 from pkmcal.measurements.carried_load import CarriedLoad
 from pkmcal.measurements.field import (
     declared,
@@ -132,6 +133,9 @@ class Measurements(Result):
         (N, 2 + n).
     time : (N,) array, optional
         When each row was measured, in seconds from any start: for the test of drift.
+    beside : mapping of str to (N,) array, optional
+        Other numbers of the rows by name, for readings and effects of your own; NaN: not read.
+        Kept as a structured array (N,): ``beside["current"]``.
     lines : (N,) array of int, optional
         The line of each row in the file it was read from, to name it by.
 
@@ -171,6 +175,7 @@ class Measurements(Result):
     tension: FloatArray | None = declared(Tension())
     tension_sigma: FloatArray | None = declared(TensionSigma())
     load: FloatArray | None = declared(CarriedLoad())
+    beside: Any = declared(Beside())
     lines: Int64Array | None = declared(Lines())
 
     # The types above are those of the attributes; anything array-like is taken.
@@ -198,9 +203,7 @@ class Measurements(Result):
         instrument = adapted(
             "Measurements", stated(kind, instrument), fields, OF_MEASUREMENTS, present
         )
-        require_other_columns(
-            type(instrument).__name__, instrument.components, instrument.labels, of_rows
-        )
+        require_other_columns(type(instrument), of_rows)
         q = numbers("actuators", actuators)
         if q.ndim not in (1, 2) or 0 in q.shape:
             raise ArgumentError(

@@ -264,7 +264,7 @@ def leave_out_unknown(table: Table, known: Collection[str], also: Collection[str
         more = f" and {len(named) - _SHOWN} more" if len(named) > _SHOWN else ""
         many = "s" if len(named) > 1 else ""
         table.notes.append(f"unknown column{many} left out: {', '.join(named[:_SHOWN])}{more}")
-        table.left_out = tuple(table.columns[name].name for name in unknown)
+        table.left_out = {table.columns[name].name: table.columns[name].unit for name in unknown}
         table.leave_out(unknown)
 
 

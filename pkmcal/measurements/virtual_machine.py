@@ -16,7 +16,8 @@ from pkmcal.arrays import FloatArray
 from pkmcal.display import first_rows
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.geometry.carried import Load
-from pkmcal.kinematics.calibratable import ArmMachine, Solvable
+from pkmcal.kinematics.arm_machine import ArmMachine
+from pkmcal.kinematics.calibratable import Solvable
 from pkmcal.measurements.former import OF_MEASURE, adapted
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.tracker import Tracker

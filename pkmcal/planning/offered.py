@@ -17,7 +17,7 @@ from pkmcal.effects.stated import effects_on
 from pkmcal.estimation.parameters import Parameters, Prior
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.geometry.carried import Load
-from pkmcal.kinematics.calibratable import Calibratable, as_machine
+from pkmcal.kinematics.calibratable import Calibratable, as_machine, as_parallel
 from pkmcal.kinematics.perturbed import ideal
 from pkmcal.kinematics.pulled import pulled
 from pkmcal.kinematics.robot import Robot
@@ -245,8 +245,8 @@ def _of(name: str, given: Any, kind: Planned, kinds: Sequence[Planned]) -> Any:
 
 def _commanded(name: str, robot: Calibratable, places: ArrayLike) -> tuple[FloatArray, FloatArray]:
     """Poses and actuators of poses, or of an arm's joint coordinates; NaN where there are none."""
-    if isinstance(robot, Robot):
-        there, q, _ = ideal(robot, as_rows(name, places, 6)[0])
+    if (parallel := as_parallel(robot)) is not None:
+        there, q, _ = ideal(parallel, as_rows(name, places, 6)[0])
     else:
         there, q, _ = robot.commanded(as_rows(name, places, robot.n_actuators)[0])
     return there, q
@@ -270,9 +270,9 @@ def _within_limits(
     there, q = _commanded("candidates", robot, candidates)
     good = np.asarray(np.isfinite(there).all(axis=1))
     unpulled = 0
-    if isinstance(robot, Robot):  # the file of an arm has no limits
-        good[good] = robot.feasible(there[good]).ok
-        held = pulled(robot, there[good])
+    if (parallel := as_parallel(robot)) is not None:  # the file of an arm has no limits
+        good[good] = parallel.feasible(there[good]).ok
+        held = pulled(parallel, there[good])
         unpulled = int((~held).sum())
         good[good] = held
     # `identify` starts from home, too, and must find them

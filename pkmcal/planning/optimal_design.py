@@ -4,7 +4,7 @@ SciPy has no design by exchange. Everything is in coordinates in which all candi
 information about every combination of parameters: that of a choice is between 0 and 1, unitless.
 
 An exchange ends in a local optimum, and of nearly equal candidates rounding would decide in which.
-So what differs by less than `_ALIKE` is equal, of equals the first is taken, and the exchange
+So what differs by less than `TIED` is equal, of equals the first is taken, and the exchange
 starts more than once and keeps the best.
 """
 
@@ -17,7 +17,7 @@ from typing import Literal
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray, IntArray, first_largest, lots
+from pkmcal.arrays import TIED, BoolArray, FloatArray, IntArray, first_largest, lots
 from pkmcal.estimation.identifiability import decompose
 from pkmcal.exceptions import ArgumentError
 from pkmcal.statistics.linear_fit import ROUNDING
@@ -30,7 +30,6 @@ _SHORTLIST = 1000  # candidates that help most, which exchanges are first sought
 _RENEWED = 10  # members that grow on one shortlist
 _TRIED = 12  # members that matter least, one of which must want to be exchanged
 _TOGETHER = 512  # candidates that are looked at at once, as many as caches hold
-_ALIKE = 1e-6  # share by which an exchange must gain; rounding moves gains by up to 1e-7
 _STARTS = (1e-2, 1.0, 1e-4)  # candidates' worth of information that growing begins with
 _ROUNDED = 1e-9  # share by which a predicted error may exceed the one that was asked for
 _OPEN = 1e-6  # of a combination that is left open: a share of a parameter that is none
@@ -130,7 +129,7 @@ class Design:
         ridge = self._lacking(grown[0])
         found = [self._settled(chosen, ridge) for chosen in grown]
         costs = np.array([self._log_cost(np.sort(chosen), ridge) for chosen in found])
-        return self._exchanged(found[first_largest(-costs, _ALIKE)], ridge)
+        return self._exchanged(found[first_largest(-costs, TIED)], ridge)
 
     def reaching(self, error: float) -> IntArray:
         """As few candidates as predict an error (mm) that all together do."""
@@ -164,7 +163,7 @@ class Design:
         """The candidate that helps most, of those that are allowed (N,)."""
         gains = self._gains([], self._lacking([]), self._all)
         gains[~allowed] = -np.inf
-        return first_largest(gains, _ALIKE * gains.max())
+        return first_largest(gains, TIED * gains.max())
 
     def exchanged_for(self, chosen: IntArray, member: int) -> FloatArray:
         """Return the criterion with each candidate (N,) in place of a member.
@@ -211,7 +210,7 @@ class Design:
             if counts:
                 entered = np.bincount(self._sort[chosen], minlength=len(counts))
                 gains[(entered >= counts)[self._sort[among]]] = -np.inf
-            chosen.append(int(among[first_largest(gains, _ALIKE * gains.max())]))
+            chosen.append(int(among[first_largest(gains, TIED * gains.max())]))
             yield chosen[-1]
 
     def _reduced(self, chosen: list[int], error: float) -> IntArray:
@@ -252,7 +251,7 @@ class Design:
         for sort, size in enumerate(sizes):
             gains = self._largest(chosen, ridge, self._sort == sort, min(_SHORTLIST, size))
             least = np.partition(gains, -min(_SHORTLIST, size))[-min(_SHORTLIST, size)]
-            short |= gains >= least - _ALIKE * abs(least)  # all that are equal
+            short |= gains >= least - TIED * abs(least)  # all that are equal
         short[chosen] = True
         return np.flatnonzero(short)
 
@@ -268,8 +267,8 @@ class Design:
                 gains = self._gains(others, ridge, among)
                 gains[self._sort[among] != self._sort[i]] = -np.inf
             own = self._gains(others, ridge, np.array([i]))[0]
-            best = first_largest(gains, _ALIKE * gains.max())
-            if gains[best] > (1.0 + _ALIKE) * own:
+            best = first_largest(gains, TIED * gains.max())
+            if gains[best] > (1.0 + TIED) * own:
                 return [*others, int(among[best])], True
         return chosen, False
 
@@ -279,7 +278,7 @@ class Design:
         losses = self._changes(self._blocks[at], at, -1.0, ridge)
         order: list[int] = []
         while len(order) < min(_TRIED, len(at)):
-            least = first_largest(-losses, _ALIKE * abs(losses.min()))
+            least = first_largest(-losses, TIED * abs(losses.min()))
             order.append(int(at[least]))
             losses[least] = np.inf
         return order
@@ -318,7 +317,7 @@ class Design:
         gains[~allowed] = -np.inf
         least = np.partition(gains, -count)[-count]
         rest = np.flatnonzero(
-            (bounds >= least - 2.0 * _ALIKE * abs(least)) & np.isinf(gains) & allowed
+            (bounds >= least - 2.0 * TIED * abs(least)) & np.isinf(gains) & allowed
         )
         if len(rest):
             gains[rest] = self._gains(chosen, ridge, rest)

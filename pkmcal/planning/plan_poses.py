@@ -12,13 +12,12 @@ from numpy.typing import ArrayLike
 from pkmcal.arguments import number, whole, word
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray, IntArray, mm_per_unit
-from pkmcal.core.library import POSE
 from pkmcal.display import Table, fixed
 from pkmcal.effects.effect import Effects
 from pkmcal.estimation.parameters import Prior
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.carried import Load
-from pkmcal.kinematics.calibratable import Calibratable
+from pkmcal.kinematics.calibratable import Calibratable, as_machine, as_parallel
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.tracker import Tracker
@@ -110,14 +109,13 @@ class Plan(Result):
 
     def _parts(self) -> Iterator[str | Table]:
         left_out = f"; {self.left_out} candidates left out" if self.left_out else ""
-        if isinstance(self.robot, SerialArm):  # several postures have one pose
-            names: Sequence[str] = [f"q{i + 1}" for i in range(self.robot.n_joints)]
-            given, units = self.actuators, self.robot.actuator_units
-        else:
-            names, given, units = POSE, self.poses, ("mm",) * 3 + ("rad",) * 3
-        turning = np.array([unit == "rad" for unit in units])
+        machine = as_machine(self.robot)
+        given = machine.as_commands(self.poses, self.actuators)
+        turning = np.array([unit == "rad" for unit in machine.commands.values()])
         heads = ["candidate"]
-        heads += [f"{n} [{'deg' if t else 'mm'}]" for n, t in zip(names, turning, strict=True)]
+        heads += [
+            f"{n} [{'deg' if unit == 'rad' else unit}]" for n, unit in machine.commands.items()
+        ]
         rows = [
             [str(index), *(fixed(float(value), 3) for value in row)]
             for index, row in zip(
@@ -155,7 +153,11 @@ class Plan(Result):
         if not np.isfinite(self.predicted):
             yield "too few to identify all of them"
         if self.unpulled:
-            load = "the load of its file" if _loaded(self.robot) else "what holds it at home"
+            load = (
+                "the load of its file"
+                if as_machine(self.robot).model.load
+                else "what holds it at home"
+            )
             yield f"under {load} some cable would have to push at {self.unpulled} of those left out"
         yield Table(heads, rows)
 
@@ -370,12 +372,13 @@ def _drives(robot: Calibratable, q: FloatArray) -> tuple[FloatArray, FloatArray]
 
     Lengths and angles, whatever the actuators read: those may be steps or turns.
     """
-    if not isinstance(robot, Robot):
+    parallel = as_parallel(robot)
+    if parallel is None:
         arcs = mm_per_unit(robot.actuator_units, robot.length)
         return q * arcs, np.zeros(robot.n_actuators)
     home = robot.commanded(robot.home)[1]
-    drives = robot.machine.drives(robot.slots, np.vstack([home, q]))
-    drives = drives * np.array([robot.length if d.angle else 1.0 for d in robot.model.drives])
+    drives = parallel.machine.drives(parallel.slots, np.vstack([home, q]))
+    drives = drives * np.array([robot.length if d.angle else 1.0 for d in parallel.model.drives])
     return drives[1:], drives[0]
 
 
@@ -397,10 +400,6 @@ def _carried(loads: Sequence[Load | None], which: IntArray) -> Load | None:
 
 def _way(travel: float) -> str:
     return f"{travel:.4g}" if travel < 1e4 else f"{travel:.0f}"
-
-
-def _loaded(robot: Robot | SerialArm) -> bool:
-    return isinstance(robot, Robot) and robot.model.load is not None
 
 
 def _poses(count: int) -> str:

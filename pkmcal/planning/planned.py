@@ -20,8 +20,7 @@ from pkmcal.estimation.starts import with_starts
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.geometry.carried import Load
 from pkmcal.kinematics import pose_steps
-from pkmcal.kinematics.calibratable import ArmMachine, Calibratable
-from pkmcal.kinematics.robot import Robot
+from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.tracker import Tracker
 from pkmcal.measurements.virtual_machine import VirtualMachine
@@ -50,12 +49,12 @@ def planned(
     load: Load | None = None,
 ) -> Measurements:
     """Make the planned measurements, rows of a pose one after another; `several` are targets."""
-    if isinstance(robot, Robot) and robot.model.balanced_load is not None:
+    if robot.model.balanced_load is not None:
         raise ArgumentError(
             f"robot: plans know no load cells, and tensions of {robot.name} are to balance its load"
             " ([load] balance)"
         )
-    surplus = isinstance(robot, Robot) and pose_steps.surplus(robot) > 0
+    surplus = pose_steps.surplus(robot) > 0
     if surplus and actuator_noise is None:
         raise ArgumentError(
             f"actuator_noise: {robot.name} has more actuators than ways to move, which are"
@@ -159,7 +158,7 @@ def stated_loads(robot: Calibratable, payloads: Sequence[float | Load]) -> list[
     for each in found:
         each.rows(())
         if not robot.yields:
-            what = "joint*" if isinstance(robot, ArmMachine) else "offset*"
+            what = "joint*" if robot.kind == "arm" else "offset*"
             raise ArgumentError(
                 f"payloads: nothing of {robot.name} yields: plan with effects="
                 f"[pk.Elasticity('{what}')], --effects 'elasticity={what}', state stiffness in its"
@@ -170,10 +169,7 @@ def stated_loads(robot: Calibratable, payloads: Sequence[float | Load]) -> list[
 
 def under(robot: Calibratable, load: Load | None) -> Calibratable:
     """The machine with what it is to carry."""
-    if load is None:
-        return robot
-    assert isinstance(robot, Robot | ArmMachine)
-    return robot.under(load)
+    return robot if load is None else robot.under(load)
 
 
 def equations_of(

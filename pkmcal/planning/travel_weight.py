@@ -8,11 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, IntArray, first_largest
+from pkmcal.arrays import TIED, FloatArray, IntArray, first_largest
 from pkmcal.planning.optimal_design import Design
 from pkmcal.planning.tour import short_tour, tour_length
 
-_ALIKE = 1e-6  # by which an exchange must lower the sum; less may be rounding
 # Exchanges end in a local optimum. So the best of several is taken: with the weight at once, and
 # with smaller or larger ones before.
 _WAYS = (np.array([1.0]), np.array([4.0, 2.0, 1.0]))
@@ -53,7 +52,7 @@ def with_travel(
     """
     found = [_descended(design, chosen, places, start, weight * way, most) for way in _WAYS]
     costs = np.array([cost for _, cost in found])
-    path = found[first_largest(-costs, _ALIKE)][0]
+    path = found[first_largest(-costs, TIED)][0]
     return path, tour_length(np.vstack([start, places[path]]))
 
 
@@ -74,7 +73,7 @@ def _descended(
             if length < (1.0 - _NEAR) * tour_length(np.vstack([start, places[path]])):
                 path = path[order]
             path, least = _swept(design, path, places, start, weight, most)
-            if not least < cost - _ALIKE:
+            if not least < cost - TIED:
                 break
             cost = least
     return path, cost
@@ -99,10 +98,10 @@ def _swept(
         now = deviations[member] + weight * float(np.log(max(tour, np.finfo(float).tiny)))
         deviations[np.exp(deviations) > most] = np.inf
         sums = deviations + weight * np.log(np.maximum(length, np.finfo(float).tiny))
-        best = first_largest(-sums, _ALIKE)
+        best = first_largest(-sums, TIED)
         new = np.insert(rest, entry[best], best)
         cost = now
-        if sums[best] < now - _ALIKE and design.predicted(new) <= most:
+        if sums[best] < now - TIED and design.predicted(new) <= most:
             path, cost = new, float(sums[best])
     return path, cost
 

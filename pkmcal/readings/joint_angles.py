@@ -32,7 +32,7 @@ def place_of(machine: Calibratable, joint: str) -> int:
     ValueError
         The machine has none of this name, or it slides.
     """
-    names = machine.passive_names if isinstance(machine, Robot) else ()
+    names = machine.passive_names
     if joint not in names:
         raise ArgumentError(
             f"joint: {machine.name} has no passive joint {joint!r}{did_you_mean(joint, names)}"
@@ -42,7 +42,7 @@ def place_of(machine: Calibratable, joint: str) -> int:
 
 def follows_pose(machine: Calibratable, joint: str) -> bool:
     """Return whether the angle of a joint follows from the pose: of a pulley's swivel it does."""
-    return isinstance(machine, Robot) and machine.model.chains is None
+    return machine.model.chains is None
 
 
 def swivels(

@@ -27,7 +27,8 @@ def rotations(angles: FloatArray) -> FloatArray:
 
 def between(measured: FloatArray, predicted: FloatArray) -> FloatArray:
     """Rotation vectors (N, 3), rad, that turn the predicted angles (N, 3) into the measured."""
-    turn = rotations(measured) @ rotations(predicted).transpose(0, 2, 1)
+    both = rotations(np.concatenate([measured, predicted]))
+    turn = both[: len(measured)] @ both[len(measured) :].transpose(0, 2, 1)
     vectors: FloatArray = screws.log(_motions(turn))[:, :3]
     return vectors
 
@@ -100,6 +101,6 @@ def covariance(sigma: FloatArray, angles: FloatArray) -> FloatArray:
 
 
 def _motions(turns: FloatArray) -> FloatArray:
-    motions = np.tile(np.eye(4), (len(turns), 1, 1))
-    motions[:, :3, :3] = turns
+    motions = np.zeros((len(turns), 4, 4))
+    motions[:, :3, :3], motions[:, 3, 3] = turns, 1.0
     return motions.reshape(-1, 16)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -82,6 +83,8 @@ def require_shape(what: str, found: object, shape: tuple[int, ...]) -> None:
     if not isinstance(found, np.ndarray) or found.shape != shape:
         seen = found.shape if isinstance(found, np.ndarray) else kind(found)
         raise ArgumentError(f"{what} must be an array of shape {shape}; found {seen}")
+    if found.dtype.kind == "f" and found.dtype.itemsize < 8:
+        raise ArgumentError(f"{what} must be doubles; found {found.dtype}")
 
 
 def require_predicted(name: str, components: int, rows: int, found: object) -> None:
@@ -94,6 +97,36 @@ def require_predicted(name: str, components: int, rows: int, found: object) -> N
     for side in ("by_frame", "by_other"):
         if getattr(found, side) is not None:
             require_shape(f"{what}: {side}", getattr(found, side), (rows, components, 6))
+
+
+def require_arguments(
+    name: str,
+    predict: Callable[..., Any],
+    at: At,
+    given: Mapping[str, Any],
+    method: str,
+) -> None:
+    """Refuse an argument that `predict` of a kind swallows: a mistyped name.
+
+    That is one which it neither lists nor hands on to what its values depend on.
+
+    Raises
+    ------
+    ValueError
+        Such a name.
+    TypeError
+        No mapping of names.
+    """
+    what = f"kind: {method} of {name!r}"
+    if not isinstance(given, Mapping):
+        found = kind(given)
+        raise ArgumentTypeError(f"{what} must return arguments of predict by name; found {found}")
+    listed = inspect.signature(predict).parameters
+    for each in given.keys() - listed.keys():
+        other = {**given, each: np.asarray(given[each]) + 1.0}
+        one, two = (predict(at, **numbers) for numbers in (given, other))
+        if isinstance(one, Predicted) and np.array_equal(one.values, two.values, equal_nan=True):
+            raise ArgumentError(f"{what}: {each!r} is no argument of predict, which ignores it")
 
 
 class Lots(NamedTuple):

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
 from typing import Any, ClassVar, Literal, NamedTuple, Protocol, TypeVar
 
 import numpy as np
@@ -23,7 +24,14 @@ from pkmcal.files.csv_writer import WrittenColumn
 from pkmcal.readings import orientation, rows
 from pkmcal.readings.alignment import Laid, Sighting
 from pkmcal.readings.measured import InFit, Measured
-from pkmcal.readings.predicted import At, Lots, Predicted, Shared, require_predicted
+from pkmcal.readings.predicted import (
+    At,
+    Lots,
+    Predicted,
+    Shared,
+    require_arguments,
+    require_predicted,
+)
 from pkmcal.readings.unknowns import Dependence, Found
 
 Components = tuple[tuple[str, str], ...]
@@ -60,6 +68,15 @@ class Family(NamedTuple):
     def noun(self) -> str:
         """Noun for these readings."""
         return {"mm": "lengths", "rad": "angles"}.get(self.unit, f"readings in {self.unit}")
+
+
+@cache
+def families_by_unit(units: tuple[str, ...]) -> tuple[Family, ...]:
+    """Families of components that have the same of these units."""
+    return tuple(
+        Family(unit, tuple(k for k, each in enumerate(units) if each == unit))
+        for unit in dict.fromkeys(units)
+    )
 
 
 class Reading:
@@ -231,8 +248,9 @@ class Reading:
 
     def simulated(self, m: Measured, solve: Solve) -> FloatArray:
         """Compute what the instrument would read without noise, (N, k)."""
-        at = At(solve(m.actuators, "q").pose, axis=np.full(len(m), 2))
-        found = self.predict(at, **self.arguments(m))
+        at, given = At(solve(m.actuators, "q").pose, axis=np.full(len(m), 2)), self.arguments(m)
+        require_arguments(self.name, self.predict, at, given, "arguments")
+        found = self.predict(at, **given)
         require_predicted(self.name, len(self.components), len(m), found)
         return found.values
 
@@ -290,10 +308,7 @@ class Reading:
     @property
     def families(self) -> tuple[Family, ...]:
         """Return the components by unit: lengths or angles, say, may be wrong by themselves."""
-        return tuple(
-            Family(unit, tuple(k for k, each in enumerate(self.units) if each == unit))
-            for unit in dict.fromkeys(self.units)
-        )
+        return families_by_unit(self.units)
 
     def arcs(self, m: Measured, length: float) -> FloatArray:
         """Return factors from each component's residual to mm (k,): one number for all rows."""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterable
+from functools import cache
 from typing import Literal, NamedTuple, cast
 
 from pkmcal.arguments import shown, word
@@ -84,6 +86,7 @@ def _require_stated(reading: Reading, argument: str) -> None:
         raise ArgumentTypeError(
             f'{argument}: the class {of.__name__} has to state its name, as in name = "loop"'
         )
+    _require_fields(type(reading))
     pairs = reading.components
     stated = isinstance(pairs, tuple) and all(
         isinstance(pair, tuple) and [*map(type, pair)] == [str, str] for pair in pairs
@@ -92,6 +95,53 @@ def _require_stated(reading: Reading, argument: str) -> None:
         raise ArgumentTypeError(
             f"{argument}: the class {of.__name__} has to state its components with their units, as"
             f' in components = (("length", "mm"),); found {shown(pairs)}'
+        )
+
+
+@cache
+def _require_fields(of: type[Reading]) -> None:
+    """Refuse a class that is no dataclass, or lists what is none of its fields.
+
+    Raises
+    ------
+    TypeError
+        What it lacks, by name.
+    """
+    own = "__dataclass_fields__" in vars(of) or "__init__" not in vars(of)
+    if not (dataclasses.is_dataclass(of) and own):
+        raise ArgumentTypeError(
+            f"kind: the class {of.__name__} has to be a dataclass, @dataclass(frozen=True,"
+            " eq=False), whose fields are the instrument's own"
+        )
+    if of.predict is Reading.predict:
+        raise ArgumentTypeError(
+            f"kind: the class {of.__name__} has no method predict(self, at, **numbers), which says"
+            " what is read there"
+        )
+    names = [each.name for each in dataclasses.fields(of)]
+    for listed in ("labels", "per_row", "own_points", "truth", "stated"):
+        several = getattr(of, listed)
+        if not isinstance(several, tuple):
+            raise ArgumentTypeError(
+                f"kind: {listed} of the class {of.__name__} has to be a tuple of names, as in"
+                f' {listed} = ("wire",); found {shown(several)}'
+            )
+        for name in several:
+            if name not in names:
+                raise ArgumentTypeError(
+                    f"kind: {listed} of the class {of.__name__} names {shown(name)}, which is no"
+                    f" field of it; it has {', '.join(names) or 'none'}"
+                )
+    pair = of.nouns
+    if pair is not None and not (isinstance(pair, tuple) and [*map(type, pair)] == [str, str]):
+        raise ArgumentTypeError(
+            f"kind: nouns of the class {of.__name__} are one and several, as in"
+            f' nouns = ("foot", "feet"); found {shown(pair)}'
+        )
+    if of.turning is not None and len(of.components) != of.turning + 3:
+        raise ArgumentTypeError(
+            f"kind: turning of the class {of.__name__} is the first of its last three components,"
+            f" and it has {len(of.components)}; found {of.turning}"
         )
 
 

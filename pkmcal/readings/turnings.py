@@ -62,8 +62,9 @@ class Pose(Reading):
             yield always("tool", "tool", PLACE, [""] * len(data.measured), data.starts)
 
     def starts(self, machine: Any, sets: Sets, found: Found) -> None:
-        """The tool at the platform; `estimation.first_frames` aligns it together with frames."""
-        found["tool", ""] = Start(tuple(range(6)), np.zeros(6))
+        """An unknown tool at the platform; `estimation.first_frames` aligns it with frames."""
+        if any(data.unknown_target for data, _ in sets):
+            found["tool", ""] = Start(tuple(range(6)), np.zeros(6))
 
     def frame(self, seen: Sighting) -> Laid:
         """The frame in which the poses are nearest."""

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from pkmcal.arguments import kind
 from pkmcal.arrays import FloatArray, IntArray, Unit
-from pkmcal.exceptions import ArgumentError
+from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 
 POINT: tuple[tuple[str, Unit], ...] = (("x", "mm"), ("y", "mm"), ("z", "mm"))
 ANGLES: tuple[tuple[str, Unit], ...] = (("alpha", "rad"), ("beta", "rad"), ("gamma", "rad"))
@@ -67,6 +68,23 @@ class Dependence:
     index: IntArray
 
 
+def yielded(owner: object, given: object) -> Iterator[Dependence]:
+    """Iterate over what the method `dependences` of a reading or an effect returned.
+
+    Raises
+    ------
+    TypeError
+        Something else than dependences.
+    """
+    for each in given if isinstance(given, Iterable) else (given,):
+        if not isinstance(each, Dependence):
+            raise ArgumentTypeError(
+                f"{type(owner).__name__}: dependences has to yield objects of Dependence, as"
+                f" always(…) and point(…) return; found {kind(each)}"
+            )
+        yield each
+
+
 @dataclass(frozen=True, eq=False)
 class Start:
     """The start of an artefact, a zero or a sensor, found with the nominal machine.
@@ -84,6 +102,15 @@ class Start:
     slots: tuple[int, ...]
     values: FloatArray
     axis: int = 0
+
+    def __post_init__(self) -> None:
+        values = np.asarray(self.values, dtype=np.float64)
+        if values.shape != (len(self.slots),):
+            raise ArgumentError(
+                f"Start: {len(self.slots)} slots {tuple(self.slots)} need as many values; found"
+                f" shape {values.shape}"
+            )
+        object.__setattr__(self, "values", values)
 
 
 Found = dict[tuple[str, str], Start]  # by role and name
@@ -126,6 +153,11 @@ def always(
             raise ArgumentError(
                 f"{argument}: the search for {role} {str(name)!r} has no start: the method starts"
                 f" of the reading has to set found[{role!r}, {str(name)!r}] = Start(…)"
+            )
+        if not set(start.slots) <= {*range(len(numbers))}:
+            raise ArgumentError(
+                f"{argument}: the start of {role} {str(name)!r} has slots {tuple(start.slots)},"
+                f" and the argument {len(numbers)} numbers, from 0"
             )
         chosen = [numbers[slot] for slot in start.slots]
         whose = ".".join(filter(None, (role.partition(" ")[0], name)))

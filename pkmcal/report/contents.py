@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from pkmcal import display
-from pkmcal.arms.arm import SerialArm
-from pkmcal.arrays import FloatArray, largest_first, propagate, rms
+from pkmcal.arrays import TIED, FloatArray, largest_first, propagate, rms
 from pkmcal.calibration.identification import Identification
 from pkmcal.core.library import POSE
 from pkmcal.display import printable
@@ -22,7 +21,6 @@ from pkmcal.measurements.repeats import groups
 from pkmcal.report.places import Places
 
 _WORST = 10  # rows that are listed
-_ALIKE = 1e-6  # mm by which distances differ that are not equal
 _MOSTLY, _ONLY = 0.5, 0.99  # of the prior's deviation, above which the prior dominates
 _ELSEWHERE = 1.0  # mm: a pose so far from the desired one is of another assembly mode
 _NEGLIGIBLE = 1e-3  # share of a parameter in unidentifiable combinations
@@ -79,9 +77,8 @@ def instrument_identified(found: Identification) -> bool:
 
 def export_command(found: Identification) -> str:
     """Return the command that writes the calibrated machine for its firmware; "" of others."""
-    if isinstance(found.robot, SerialArm) or found.robot.model.controller is None:
-        return ""
-    return found.robot.model.controller.command("robot.toml")
+    controller = found.fit.parameters.robot.model.controller
+    return "" if controller is None else controller.command("robot.toml")
 
 
 def directions(found: Identification) -> list[dict[str, Any]]:
@@ -133,7 +130,7 @@ def worst(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Select the rows with the largest distances after the calibration."""
     read = [row for row in rows if np.isfinite(row["after"])]
     off = np.array([row["after"] for row in read])
-    return [read[i] for i in largest_first(off, _ALIKE)[:_WORST]]
+    return [read[i] for i in largest_first(off, TIED)[:_WORST]]
 
 
 def moved(rows: list[dict[str, Any]]) -> list[tuple[int, str, str, int]]:
@@ -300,8 +297,8 @@ def over_the_workspace(
 
 def over_the_measured(found: Identification) -> FloatArray:
     """Predict the accuracy at the poses that were measured, mm; those that are known."""
-    end = found.fit.end
-    predicted = expected(found, end.actuators if isinstance(found.robot, SerialArm) else end.pose)
+    end, machine = found.fit.end, found.fit.parameters.robot
+    predicted = expected(found, machine.as_commands(end.pose, end.actuators))
     return predicted[np.isfinite(predicted)]
 
 

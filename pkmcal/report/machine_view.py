@@ -74,9 +74,9 @@ def change(found: Identification) -> dict[str, Any]:
     None of a machine with drive laws, whose numbers are not in the memory of the page's core: there
     the machine as assumed is not overlaid.
     """
-    if isinstance(found.robot, Robot) and found.robot.model.driven:
-        return {"places": [], "before": [], "after": [], "times": 1, "most": 1}
     parameters = found.fit.equations.parameters
+    if parameters.robot.model.driven:
+        return {"places": [], "before": [], "after": [], "times": 1, "most": 1}
     assumed = as_given(parameters.robot.replace(parameters.values_at(found.fit.start.theta)))
     before, after = _numbers(assumed), _numbers(found.robot)
     places = np.flatnonzero(before != after)

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pkmcal import display
-from pkmcal.arms.arm import SerialArm
 from pkmcal.calibration.identification import Identification
 from pkmcal.calibration.summary import WIDER
 from pkmcal.display import printable
@@ -122,7 +121,7 @@ def gather(
         "stiffness": yielding.of(found.robot, None if isinstance(places, str) else places),
         "inputs": checksums(files),
         "instrument_sought": contents.instrument_identified(found),
-        "arm": isinstance(found.robot, SerialArm),
+        "arm": found.fit.parameters.robot.kind == "arm",
         "export": contents.export_command(found),
         "version": version(),
     }

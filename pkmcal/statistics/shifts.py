@@ -26,7 +26,9 @@ from pkmcal.statistics.singular_values import svd
 _CHANCE = 0.01  # among all candidates, below which one has shifted …
 _SHARE, _FALL = 0.05, 0.03  # … if it is so much of the disagreement, and the rms falls so much
 _EQUAL = 1e-6  # share by which drops and chances differ that are not equal
-_ALIKE = 6.63  # drop in units of the variance by which candidates differ that can be told apart
+# Drop in units of the variance by which candidates differ that can be told apart: χ² of one degree
+# of freedom, exceeded by chance in 1 of 100.
+TOLD_APART = 6.63
 _FEW = 30  # equations up to which clusters are too few for their own variances
 _TOLD = 0.01  # share of the others of a kind that must be left of each, to be estimated along
 _SAME = 1e-6  # share of a candidate that must be left beside what is there
@@ -133,7 +135,7 @@ def shifted(
             for other in (trials[i] for i in _most(trials))
             if other.candidate != best.candidate
             and other.basis.shape[1] <= same
-            and best.drop - other.drop < _ALIKE * variance
+            and best.drop - other.drop < TOLD_APART * variance
         )
         common = np.column_stack([common, best.basis])
         rms = float(np.sqrt((after[late] ** 2).mean()))

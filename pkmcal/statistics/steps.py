@@ -8,11 +8,11 @@ them is less.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from functools import cache
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray
+from pkmcal.arrays import BoolArray, FloatArray
 
 LEAST_ROWS = 5  # readings that show a step
 _EXACT = 1e-6  # of a step, by which multiples of it may be off
@@ -52,28 +52,58 @@ def step_of(values: FloatArray, unit: str, least: float = 0.0) -> float:
     if len(read) < LEAST_ROWS:
         return 0.0
     rounding = _ROUNDING * float(np.abs(read).max())
-    differences = np.unique(np.abs(read - read[0]))
+    differences = np.sort(np.abs(read - read[0]))
     differences = differences[differences > rounding]
     if not len(differences):
         return 0.0
+    steps = _candidates(differences, unit, max(least, rounding / _SURE))
     sample = differences[:: -(-len(differences) // _FIRST)]
-    for step in _candidates(differences, unit, max(least, rounding / _SURE)):
-        if _multiples(sample, step, rounding) and _multiples(differences, step, rounding):
-            return step
+    for step in steps[_multiples(sample, steps[:, None], rounding)].tolist():
+        if _multiples(differences, step, rounding):
+            return float(step)
     return 0.0
 
 
-def _candidates(differences: FloatArray, unit: str, least: float) -> Iterator[float]:
+def smallest_gaps(values: FloatArray) -> FloatArray:
+    """The smallest difference of two readings (N, k) of each component that is no rounding, (k,).
+
+    A step is no larger, but for rounding; inf where nothing was read in some row.
+
+    Examples
+    --------
+    >>> smallest_gaps(np.array([[0.3, 1.0], [0.1, 1.0], [0.4, 1.5], [0.9, 1.0]])).round(9)
+    array([0.1, 0.5])
+    """
+    ordered = np.sort(values, axis=0)
+    gaps = ordered[1:] - ordered[:-1]
+    largest = np.maximum(np.abs(ordered[0]), np.abs(ordered[-1]))
+    rounding = 2.0 * np.maximum(_EXACT * (ordered[-1] - ordered[0]), _ROUNDING * largest)
+    found: FloatArray = np.where(gaps > rounding, gaps, np.inf).min(axis=0, initial=np.inf)
+    return found
+
+
+def _candidates(differences: FloatArray, unit: str, least: float) -> FloatArray:
     """Steps that may be, the largest first."""
-    gaps = np.diff(differences, prepend=0.0)
+    gaps = differences[1:] - differences[:-1]
     smallest = float(gaps[gaps > _EXACT * differences[-1]].min(initial=differences[0]))
-    decimal = np.concatenate([_DECIMALS * size for size in _UNITS.get(unit, (1.0,))])
-    steps = np.concatenate([decimal, smallest / np.arange(1, _PARTS + 1)])
+    if smallest * (1.0 + _EXACT) < least:
+        return np.empty(0)
+    steps = np.concatenate([_decimals(unit), smallest / np.arange(1, _PARTS + 1)])
     possible = (steps >= least) & (steps <= smallest * (1.0 + _EXACT))
-    yield from np.sort(steps[possible])[::-1].tolist()
+    found: FloatArray = np.sort(steps[possible])[::-1]
+    return found
 
 
-def _multiples(differences: FloatArray, step: float, rounding: float) -> bool:
+@cache
+def _decimals(unit: str) -> FloatArray:
+    """Steps that dials, displays and files of a unit have."""
+    return np.concatenate([_DECIMALS * size for size in _UNITS.get(unit, (1.0,))])
+
+
+def _multiples(
+    differences: FloatArray, step: FloatArray | float, rounding: float
+) -> BoolArray | np.bool_:
+    """Return whether all differences (N,) are multiples of a step, or of each of several (s, 1)."""
     counts = np.round(differences / step)
     off = np.abs(differences - counts * step)
-    return bool((off <= np.maximum(_EXACT * step, rounding)).all())
+    return (off <= np.maximum(_EXACT * step, rounding)).all(axis=-1)

@@ -14,7 +14,7 @@ import pkmcal as pk
 from pkmcal.arms.joint_laws import JointLaws, Term, sag_term
 from pkmcal.arms.joint_pulls import Balancer, JointPulls
 from pkmcal.arms.weights import gravity_products, gravity_torques
-from pkmcal.kinematics.calibratable import ArmMachine
+from pkmcal.kinematics.arm_machine import ArmMachine
 
 AXES = [[0, 0, 1], [0, 1, 0], [0, 1, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0]]
 POINTS = [[0, 0, 0], [0, 0, 290], [0, 0, 560], [0, 0, 630], [302, 0, 630], [374, 0, 630]]

@@ -18,7 +18,7 @@ from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.free_parameters import parameters
 from pkmcal.estimation.parameters import Asked
-from pkmcal.kinematics.calibratable import ArmMachine
+from pkmcal.kinematics.arm_machine import ArmMachine
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.virtual_machine import VirtualMachine
 from pkmcal.readings import Distance

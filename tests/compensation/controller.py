@@ -15,6 +15,15 @@ class Odd(Exception):
     """A command by whose meaning the program cannot be corrected: it has to be refused."""
 
 
+def without_mark(text: str) -> str:
+    """A text without the byte-order mark that stands before a remark; before words it is odd."""
+    if text[:1] != "\ufeff":
+        return text
+    if text[1:].lstrip(" ")[:1] not in (";", "\r", "\n", "(", ""):
+        raise Odd("words behind a byte-order mark")
+    return text[1:]
+
+
 @dataclass(frozen=True)
 class Step:
     """A straight or rapid move of a controller, or what else it did."""

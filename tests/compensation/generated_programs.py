@@ -50,6 +50,7 @@ ODD = {
         G1 X5 X6 | G0 G1 X2 | % | G1 (a (b) X5 | M30 | G64 | (G1 X5 | G1 X5 ; (a | N5 X3 |
         n9g1x4y5 | g 1 x 4 | G1.0 X3 | T3 M6 X5 | G28 Z5 | M429 | G5 X1 Y1 P1 Q1 | G41 D1 |
         M6 G1 X5 F90 | G70 | G71 Q100 X4 | G72.1 Q1 | G74 X1 |
+        ;py,self.execute("G0 X9") | (pyrun,a.py) | ; PY,f(1) X3 | (pyramid) | G43.4 | G92.9 |
         F250 | G1 F333 | G1 X5 H3 | G1 X5 P2 | G7 | G33 Z-1 K1
     """,
     "marlin": """
@@ -64,6 +65,9 @@ ODD = {
         G1 X5 (Z3) | (G1 X5) | G1 X5 X6 | G4 P5 G1 X20 | M999 X5 | FOO X5 | M605 S2 | M851 Z1 |
         M852 I1 | M360 | M810 G1 X5 | G28 X | G28 X0 Y0 | G92 E0 | G92 E5 | G42 I1 J1 |
         M207 S1 F100 | F500 | G1 F700 | G1 X5 H2 | G1 X4 S200 | M211 S0 | M350 X16 | G92 E0 X5 |
+        G1 X\t5 Y5 | \tG1 X5 | N5\tG1 X5 | n5 G1 X5 | N 5 G1 X5 | G1 Y0X10 | G1 Y-0X9 Z3 |
+        G1 Y10X3 | M117 a\\ | ; C:\\ | G1 X5 ; \\ | M665.1 L215 | M92.1 X80 | M306 T | G 91 |
+        G1                                                                       X5 Y5 Z45 F700 |
         G54 | G60 | G5 X1 Y2 | T0 X5 | % | M26 S0 | M351 S1 X1 | M240 | M240 X5 | M915 | M916 X |
         M862.3 P "a" | M25 | M704 | G0 X20 Y-9 S90
     """,
@@ -83,6 +87,7 @@ ODD = {
         G28 X0 Y0 | G1 F900 | F900 | G60 | G61 | M669 K1 | G01 X4 | G1.1 X4 | M569 P0 S1 | G93 |
         M42 X5 | M600 X5 | G30 P0 X1 Y1 | M291 P"a" S3 X1 | M109 S200 | M226 | M7 | G80 | G40 |
         M560 P"a" | M596 P1 | M594 P1 | M916 | G38.2 Z-5 | G28 M106 S1 | M98 P"a" G1 X3 Y2 Z40 |
+        G 1 X7 | M 83 | N 3 G1 X5 | M37 S1 | M37 P"a" | M26 S0 | M665.1 R5 | (G1 X5) |
         M651 | M601 | M957 E"a"
     """,
     "klipper": """
@@ -94,6 +99,7 @@ ODD = {
         G1 X5 (Z3) | (G1 X5) | ( G28 X ) | G4 P5 G1 X20 | PARK X=5 | park x=5 | M999 X5 | G28 X0 |
         G92 E0 | G92 E4 | SDCARD_PRINT_FILE FILENAME=a | M23 a | M24 | G1 X5 X6 | N3 G1 X5 |
         N3G1 X5 | G91.1 | G1 F900 | F900 | G1 X5 R2 | DELTA_CALIBRATE | save_gcode_state |
+        G 1 X7 | M 83 | N 3 G1 X7 | # G1 X5 | G1 X 7 | SET_TMC_FIELD STEPPER=a FIELD=MRES VALUE=3 |
         M600 X5 | G92.1 | G1 X5*3 | set_skew xy=1 | SAVE_GCODE_STATE NAME=X | T0 X5 | G1.0 X5
     """,
 }
@@ -160,7 +166,10 @@ def program(firmware: str, rng: random.Random, odd: int = 0, joints: bool = Fals
             lines = ["%", *rng.choice([[], ["O1000"], ["(PART 7)"]]), *lines, "%"]
             lines += rng.choice([[], ["G1 X9 Y9"]])
     end = rng.choice(["\n", "\r\n", "\r"] if firmware == "marlin" else ["\n", "\r\n"])
-    return rng.choice(["", "", "\ufeff"]) + end.join(lines) + rng.choice(["", end])
+    mark = rng.choice(["", "", "\ufeff"])
+    if mark and (not odd or rng.random() < 0.7):
+        lines.insert(0, rng.choice(["", "; made by hand"]))
+    return mark + end.join(lines) + rng.choice(["", end])
 
 
 def _begin(firmware: str, rng: random.Random) -> list[str]:

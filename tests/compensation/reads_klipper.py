@@ -6,13 +6,21 @@ with M83 or with G91.
 
 from __future__ import annotations
 
-from .controller import Controller, Odd
+from .controller import Controller, Odd, without_mark
 
 ODD = {
     *("SET_GCODE_OFFSET", "SET_KINEMATIC_POSITION", "SET_SKEW", "SKEW_PROFILE", "FORCE_MOVE"),
     *("BED_MESH_PROFILE", "BED_MESH_CALIBRATE", "BED_MESH_OFFSET", "RESTORE_GCODE_STATE"),
     *("MANUAL_STEPPER", "SET_DUAL_CARRIAGE", "DELTA_CALIBRATE", "SDCARD_PRINT_FILE", "M23", "M24"),
-    *("SDCARD_LOOP_BEGIN", "STEPPER_BUZZ", "G2", "G3", "G20", "BED_TILT_CALIBRATE"),
+    *(
+        "SDCARD_LOOP_BEGIN",
+        "STEPPER_BUZZ",
+        "SET_TMC_FIELD",
+        "G2",
+        "G3",
+        "G20",
+        "BED_TILT_CALIBRATE",
+    ),
 }
 KNOWN = {
     *("G4", "G10", "G11", "G17", "M73", "M104", "M105", "M106", "M107", "M109", "M114", "M117"),
@@ -27,8 +35,8 @@ def run(text: str, start: dict[str, float], home: dict[str, float], version: int
     """Run a program."""
     it = Controller(dict(start))
     absolute = absolute_e = True
-    for line in text.replace("\r\n", "\n").replace("\r", "\n").split("\n"):
-        whole = line.lstrip("\ufeff").strip()
+    for line in without_mark(text).replace("\r\n", "\n").replace("\r", "\n").split("\n"):
+        whole = line.strip()
         line = whole.partition(";")[0].strip().upper()
         pairs = _taken_apart(line)
         if pairs and pairs[0][0] == "N":
@@ -40,12 +48,12 @@ def run(text: str, start: dict[str, float], home: dict[str, float], version: int
         if "*" in line:
             raise Odd("checksum")
         name = pairs[0][0] + pairs[0][1]
+        if version == 0 and _is_of_another_name(line, pairs[0][0]):
+            it.other(line)
+            continue
         extended = line.split()[0]
         words = dict(pairs)
         if name in ("G0", "G1"):
-            if version == 0 and line[0] == "(":
-                it.other(line)  # since 2024 what stands before the command is part of it
-                continue
             _move(it, name, words, absolute, absolute and absolute_e)
         elif name in ("G90", "G91"):
             absolute = name == "G90"
@@ -66,6 +74,11 @@ def run(text: str, start: dict[str, float], home: dict[str, float], version: int
             if not known and (pairs[0][0] not in "GM" or name in ("M18", "M84", "M600")):
                 it.hidden()  # a macro of the user
     return it
+
+
+def _is_of_another_name(line: str, letter: str) -> bool:
+    """Since 2024 what stands before a command, and a space in it, is part of its name."""
+    return line[0] in "(#" or (letter in ("G", "M") and f"{letter} " in line)
 
 
 def _move(

@@ -6,7 +6,7 @@ reciprocal of the minutes of a move and stands in each G1.
 
 from __future__ import annotations
 
-from .controller import Controller, Odd
+from .controller import Controller, Odd, without_mark
 
 ODD = {
     2,
@@ -44,7 +44,7 @@ def run(text: str, start: dict[str, float], home: dict[str, float], version: int
     """Run a program; `version` 1 has no kinematics: X, Y and Z are joints, as another machine's."""
     it = Controller(dict(start))
     state = {"motion": None, "relative": False, "inch": False, "times": False, "turns": False}
-    lines = text.lstrip("\ufeff").replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    lines = without_mark(text).replace("\r\n", "\n").replace("\r", "\n").split("\n")
     marked = next((line.strip() for line in lines if line.strip()), "") == "%"
     marks = 0
     for line in lines:
@@ -63,6 +63,10 @@ def run(text: str, start: dict[str, float], home: dict[str, float], version: int
 def _block(line: str) -> list[tuple[str, float]]:
     """The words of a block."""
     kept, inside = "", False
+    for remark in [*line.split("(")[1:], *line.split(";")[1:]]:
+        word = remark.strip().lower().partition(",")
+        if word[0] in ("py", "pyrun", "pyreload") and word[1]:
+            raise Odd("Python in a comment")
     for each in line:
         if inside:
             if each == "(":

@@ -6,7 +6,7 @@ M82 and M83 set E alone, and the last one counts (2.x); in 1.x E is relative wit
 
 from __future__ import annotations
 
-from .controller import Controller, Odd
+from .controller import Controller, Odd, without_mark
 
 # by their pages: other geometry, offsets, levelling, other programs, loops, curves
 ODD = {
@@ -16,7 +16,22 @@ ODD = {
     *("G53", "G54", "G55", "G59", "G810", "M810", "M819", "M26", "M351"),
 }
 ELSEWHERE = {
-    *("G12", "G26", "G27", "G30", "G31", "G32", "G34", "G35", "G42", "G61", "G76", "M18", "M48"),
+    *(
+        "G12",
+        "G26",
+        "G27",
+        "G30",
+        "G31",
+        "G32",
+        "G34",
+        "G35",
+        "G42",
+        "G61",
+        "G76",
+        "M18",
+        "M48",
+        "M306",
+    ),
     *("M84", "M125", "M401", "M402", "M410", "M600", "M701", "M702", "G425", "M871"),
 }
 KNOWN = {
@@ -31,8 +46,11 @@ def run(text: str, start: dict[str, float], home: dict[str, float], version: int
     """Run a program in Marlin 1 or 2."""
     it = Controller(dict(start))
     relative, e_relative, inch = False, False, 1.0
-    for line in text.replace("\r\n", "\n").replace("\r", "\n").split("\n"):
-        line = _without_number(line.partition(";")[0].lstrip("\ufeff").strip())
+    text = without_mark(text).replace("\r\n", "\n").replace("\r", "\n")
+    if version == 1:
+        text = text.replace("\\\n", " ")  # it reads on, in a comment too
+    for line in text.split("\n"):
+        line = _without_number(line.partition(";")[0][:95].strip(" "))
         letter = line[:1]
         rest = line[1:].lstrip(" ")
         digits = rest[: len(rest) - len(rest.lstrip("0123456789"))]
@@ -42,12 +60,12 @@ def run(text: str, start: dict[str, float], home: dict[str, float], version: int
             continue
         rest = rest[len(digits) :]
         name = letter + str(int(digits or 0))
-        if rest[:1] == "." and name in ("G0", "G1", "G92", "G91", "G90"):
+        if rest[:1] == "." and name in ("G0", "G1", "G92", "G91", "G90", "M92", "M665"):
             raise Odd("a subcode, which is read or not as Marlin was built")
         if name in ("M117", "M118", "M16", "M30", "M928"):
             it.other(line)
             continue
-        words = _parameters(rest)
+        words = _parameters(rest, hexadecimal=version == 1)
         if letter == "T":
             it.other(line)
             it.hidden()
@@ -120,7 +138,7 @@ def _renamed(it: Controller, words: dict[str, float | None], inch: float) -> Non
         it.extruder = words["E"] * inch
 
 
-def _parameters(rest: str) -> dict[str, float | None]:
+def _parameters(rest: str, hexadecimal: bool) -> dict[str, float | None]:
     """Letters with their numbers; of a letter that stands twice the last one counts."""
     found: dict[str, float | None] = {}
     k = 0
@@ -134,6 +152,8 @@ def _parameters(rest: str) -> dict[str, float | None]:
         begin = k
         while k < len(rest) and rest[k] in "+-.0123456789":
             k += 1
+        if hexadecimal and rest[begin:k].lstrip("+-").strip("0") == "" and rest[k : k + 1] == "X":
+            raise Odd("0X may be a number in base 16")  # as strtod reads it
         try:
             found[letter] = float(rest[begin:k])
         except ValueError:

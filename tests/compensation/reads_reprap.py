@@ -6,13 +6,13 @@ set E. In CNC mode parentheses are comments and axis words repeat the last G0 or
 
 from __future__ import annotations
 
-from .controller import Controller, Odd
+from .controller import Controller, Odd, without_mark
 
 ODD = {
     *("M92", "M206", "M290", "M350", "M375", "M376", "M425", "M501", "M502", "M556", "M569"),
     *("M579", "M584", "M665", "M666", "M667", "M669", "M23", "M24", "M28", "M32", "M121", "G2"),
     *("G3", "G29", "G32", "G53", "G55", "G68", "G31", "G93", "M606", "M560", "M594", "M596"),
-    "M916",
+    *("M916", "M26", "M37"),
 }
 ELSEWHERE = {
     *("G30", "G27", "M18", "M84", "M98", "M401", "M402", "M600", "M701", "M702", "M0", "M1"),
@@ -46,10 +46,10 @@ def run(text: str, start: dict[str, float], home: dict[str, float], version: int
     """Run it; version 1 counts relative extrusion in absolute numbers, and is in CNC mode."""
     it = Controller(dict(start))
     state = {"relative": False, "e_relative": False, "inch": False, "last": ""}
-    for line in text.replace("\r\n", "\n").replace("\r", "\n").split("\n"):
-        line = line.lstrip("\ufeff").strip()
+    for line in without_mark(text).replace("\r\n", "\n").replace("\r", "\n").split("\n"):
+        line = line.strip()
         if line[:1] in "Nn" and line[1:2].isdigit():
-            line = line[1:].lstrip("0123456789 ")
+            line = line[1:].lstrip("0123456789").lstrip()
             if "*" in line:
                 raise Odd("checksum")
         line = _bare(line, cnc=version == 1).strip()
@@ -86,6 +86,8 @@ def _bare(line: str, cnc: bool) -> str:
 
 def _first(line: str) -> tuple[str, str]:
     """The first command, and what stands behind it."""
+    if line[0].upper() not in "GMTXYZ":
+        return line, ""  # bad, to its end
     name = line[1:].lstrip(" 0123456789.")
     if line[:4].upper() == "M117" and line[4:].lstrip()[:1] != '"':
         return line, ""
@@ -100,7 +102,7 @@ def _first(line: str) -> tuple[str, str]:
 
 def _act(it: Controller, command: str, state: dict, home: dict, version: int) -> None:
     letter = command[0].upper()
-    rest = command[1:].lstrip(" ")
+    rest = command[1:]
     digits = rest[: len(rest) - len(rest.lstrip("0123456789"))]
     name = letter + str(int(digits)) if digits else letter
     rest = rest[len(digits) :]
@@ -132,7 +134,7 @@ def _act(it: Controller, command: str, state: dict, home: dict, version: int) ->
         it.at, state["macro"] = dict(home), True
     elif name == "G10" and set("LXYZ") & set(_words(rest)):
         raise Odd("G10 sets offsets")
-    elif name in ODD:
+    elif name in ODD:  # also with a fraction
         raise Odd(name)
     else:
         it.other(command)

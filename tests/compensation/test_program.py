@@ -396,11 +396,10 @@ def test_joint_moves_state_their_times_wherever_a_program_sets_modes(
 ) -> None:
     """G93 behind the mark, the number and the first modes of a program, and in place of any G94."""
     lines = ["%", "O1000 (PART)", "N1 G21 G90 G94 G17", "G0 X0 Y0 Z30", "G94 G1 X3 F1500", "%"]
-    for mark in ("", "\ufeff"):
-        found = corrected(tmp_path, mark + end.join(lines) + end, joints=True, chord=1.0).text
-        written = found.split(end)
-        assert written[:3] == [mark + "%", "O1000 (PART)", "N1 G21 G90 G93 G17"]
-        assert written[4].startswith("G93 G1 X") and written[-3:] == ["G94", "%", ""]
+    found = corrected(tmp_path, end.join(lines) + end, joints=True, chord=1.0).text
+    written = found.split(end)
+    assert written[:3] == ["%", "O1000 (PART)", "N1 G21 G90 G93 G17"]
+    assert written[4].startswith("G93 G1 X") and written[-3:] == ["G94", "%", ""]
     plain = corrected(tmp_path, "(a)" + end + end.join(lines[3:5]), joints=True, chord=1.0).text
     assert plain.split(end)[:2] == ["(a)", "G93"] and plain.split(end)[-2] == "G94"
     ended = corrected(tmp_path, end.join([*lines[2:5], "M30"]), joints=True, chord=1.0).text
@@ -491,9 +490,65 @@ def test_axes_that_are_homed_need_no_numbers(tmp_path: Path) -> None:
         corrected(tmp_path, "G1 X1 Y1 Z20\nG28 X Y\nG1 Z20 F600\n")
 
 
-def test_a_byte_order_mark_stays_before_the_program(tmp_path: Path) -> None:
-    text = "G1 X1 Y1 Z20 F600\n"
+def test_a_byte_order_mark_stays_before_a_remark_and_is_refused_before_words(
+    tmp_path: Path,
+) -> None:
+    """Controllers read it as letters, and pass over the words behind it."""
+    text = "; part\nG1 X1 Y1 Z20 F600\n"
     assert corrected(tmp_path, "\ufeff" + text).text == "\ufeff" + corrected(tmp_path, text).text
+    for words in ("G91\n", "%\n", "G28\n", "M83 ; a\n", "PARK\n"):
+        with pytest.raises(pk.FileError, match="line 1: a byte-order mark stands before it"):
+            corrected(tmp_path, "\ufeff" + words + text)
+
+
+@pytest.mark.parametrize(
+    ("firmware", "line", "why"),
+    [
+        ("linuxcnc", ";py,self.execute('G0 X9')", "runs Python"),
+        ("linuxcnc", "(PYRUN,park.py)", "runs Python"),
+        ("linuxcnc", "G43.4", "G43.4 may be read as G43"),
+        ("marlin", "G1 X\t5 Y5", "a tab"),
+        ("marlin", "; C:\\", "ends a line"),
+        ("marlin", "G1 Y0X10", "base 16"),
+        ("marlin", "M665.1 L215", "M665.1 may be read as M665"),
+        ("marlin", "n5 G1 X5", "not in capitals"),
+        ("marlin", "G1" + 90 * " " + "X5 Y5", "reads 95 characters"),
+        ("reprap", "G 91", "not all read"),
+        ("reprap", "M37 S1", "runs another program"),
+        ("reprap", "M26 S0", "cannot be followed"),
+        ("klipper", "G 1 X7", "not all read"),
+        ("klipper", "SET_TMC_FIELD STEPPER=a FIELD=MRES VALUE=3", "other numbers"),
+    ],
+)
+def test_lines_that_act_unseen_or_are_not_read_by_all_are_refused(
+    firmware: str, line: str, why: str, tmp_path: Path
+) -> None:
+    with pytest.raises(pk.FileError, match=f"line 2: .*{why}"):
+        corrected(tmp_path, f"G1 X1 Y1 Z20 F600\n{line}\nG1 X2\n", firmware=firmware)
+
+
+def test_a_line_that_becomes_longer_than_its_firmware_reads_is_refused(tmp_path: Path) -> None:
+    """Marlin passes over the end, and so over the feed."""
+    text = "G1 X1 Y1 Z20 F600\nG1 X1.1{}F12345.678 ; and a long remark, which does not count\n"
+    found = corrected(tmp_path, text.format(54 * " "), firmware="marlin").text
+    assert 90 < len(found.splitlines()[1].partition(";")[0].rstrip()) <= 95
+    with pytest.raises(pk.FileError, match="line 2: as corrected: Marlin reads 95"):
+        corrected(tmp_path, text.format(60 * " "), firmware="marlin")
+
+
+def test_angles_of_the_start_are_not_those_of_homing(tmp_path: Path) -> None:
+    """A program for a hexapod in Marlin: behind G28 it has to name angles that began otherwise."""
+    robot = pk.load("hexapod")
+    path = tmp_path / "part.gcode"
+    x, y, z = robot.home[:3]
+    for tilt, names, taken in ((0.0, "", True), (5.0, "", False), (5.0, " A0 B0 C0", True)):
+        path.write_text(f"G28\nG1 X{x} Y{y} Z{z + 5}{names} F600\n")
+        start = [x, y, z, np.radians(tilt), 0.0, 0.0]
+        if taken:
+            pk.compensate_program(robot, robot, path, firmware="marlin", start=start)
+            continue
+        with pytest.raises(pk.FileError, match="line 2: where A is, is not known here"):
+            pk.compensate_program(robot, robot, path, firmware="marlin", start=start)
 
 
 def test_the_command_line_writes_the_program_by_its_name(

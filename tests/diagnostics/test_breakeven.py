@@ -78,6 +78,5 @@ def test_what_is_stated_free_or_redundant_is_not_in_it():
 
 def test_the_summary_says_it():
     found = identified("pose")
-    assert "double on the whole if base*, platform* are wrong by" in found.summary().replace(
-        "\n  ", " "
-    )
+    line = "double on the whole if base*, platform* are wrong by"
+    assert line in found.summary().replace("\n  ", " ")

@@ -46,8 +46,8 @@ def found(hexapod: pk.Robot) -> Identification:
     ([check("a", levels=())], "a: level_of must say which"),
     ([check("a", "b", at_once=True), check("b")], "a: made at once, it cannot wait for b"),
     ([check("a", "doubt", at_once=True), check("b")], "a: made at once, it cannot wait for b"),
-    ([check("a", "b"), check("b", "c"), check("c", "a")], "cycle"),
-    ([check("a", "doubt"), check("b", "doubt")], "cycle"),
+    ([check("a", "b"), check("b", "c"), check("c", "a")], "wait for each other: a"),
+    ([check("a", "doubt"), check("b", "doubt")], "wait for each other"),
 ])  # fmt: skip
 def test_checks_that_do_not_agree_are_refused(checks: list[Any], says: str) -> None:
     with pytest.raises(ValueError, match=says):
@@ -173,3 +173,27 @@ def test_a_remedy_without_a_value_is_not_applied() -> None:
     for before in ({}, {"fix": "offset1"}):
         with pytest.raises(pk.ArgumentError, match=r"^fix: the remedy states no value"):
             pk.Remedy("fix").applied(before)
+
+
+@pytest.mark.parametrize(("wrong", "says"), [
+    ({"run": lambda found: None}, r"own: run must return its findings, \[\] of none; found None"),
+    ({"run": lambda found: 1.0}, "own: run must return its findings"),
+    ({"run": lambda found: "ab"}, "own: run must return its findings"),
+    ({"say": lambda found, seen: None}, "own: what say returns must be a str, found NoneType"),
+    ({"remedies": lambda found, seen: Remedy("drop", (0,))}, "own: remedies must return a tuple"),
+    ({"remedies": lambda found, seen: ("drop",)}, "own: remedies must return a tuple"),
+])  # fmt: skip
+def test_what_functions_of_a_check_return_wrongly_is_named(
+    found: Identification, wrong: dict[str, Any], says: str
+) -> None:
+    given = {"run": lambda found: [1], "say": lambda found, seen: "it", **wrong}
+    with pytest.raises(pk.ArgumentTypeError, match=says):
+        pk.diagnose(found, [Check(name="own", about="", **given)])
+
+
+def test_one_level_or_one_name_may_stand_alone_and_a_check_has_a_name() -> None:
+    assert check("a", levels=cast(Any, "remark")).levels == ("remark",)
+    one = Check(name="a", about="", run=len, say=str, unless=cast(Any, "grave"))  # type: ignore
+    assert one.unless == ("grave",)
+    with pytest.raises(pk.ArgumentError, match="name of a check must be a word, found None"):
+        check(cast(Any, None))

@@ -55,3 +55,36 @@ def test_a_plane_whose_height_is_exactly_zero_is_calibrated_from_noisy_angles() 
     """It was refused as a singular matrix."""
     robot, m = poses("3rrr-planar", 1, noisy=(3, 4))
     assert pk.identify(robot, m).verdict.state in ("calibrated", "doubtful")
+
+
+@pytest.mark.filterwarnings("ignore:.*further than errors of a machine")
+@pytest.mark.parametrize("name", [*STILL, "five-bar"])
+@pytest.mark.parametrize("wrong", ["late", "two machines"])
+def test_what_is_wrong_of_other_components_is_seen_beside_exact_zeros(
+    name: str, wrong: str
+) -> None:
+    """Zeros whose noise is rounding were taken for a fit of which nothing but rounding is left."""
+    rng = np.random.default_rng(4)
+    robot = pk.load(name)
+    units = dict(zip(robot.geometry.names, robot.geometry.units, strict=True))
+
+    def read(at: np.ndarray) -> np.ndarray:
+        sizes = {free: 0.2 if units[free] == "mm" else 6e-4 for free in robot.model.free}
+        true = robot.replace({free: robot.geometry[free] + size * rng.normal()
+                              for free, size in sizes.items()})  # fmt: skip
+        return true.forward(robot.inverse(at), guess=at).pose + rng.normal(0, 1, at.shape) * (
+            np.repeat([NOISE, TURNING], 3)
+        )
+
+    at = pk.sample_poses(robot, 45, seed=3, share=0.5)
+    values = read(at)
+    if wrong == "late":
+        values[1:] += 4e-3 * (values[:-1] - values[1:])
+    else:
+        values[1::2] = read(at)[1::2]
+    values[:, STILL.get(name, [2])] = 0.0
+    kind = "position" if name == "five-bar" else "pose"
+    values = values[:, :3] if kind == "position" else values
+    found = pk.identify(robot, pk.Measurements(robot.inverse(at), values, kind), holdout=0.25)
+    wanted = "late-readings" if wrong == "late" else "two-machines"
+    assert wanted in {said.check for said in found.verdict.said if said.level == "doubt"}

@@ -141,6 +141,43 @@ def test_two_files_of_two_machines_are_told_apart() -> None:
     assert ".csv" in doubts(robot, *halves)["two-machines"].text
 
 
+def sides(q: np.ndarray, rng: np.random.Generator, lean: float) -> np.ndarray:
+    """Half of the rows, the more on one side of the workspace the larger `lean`."""
+    place = lean * q[:, 0] / q[:, 0].std() + rng.normal(size=len(q))
+    return place > np.median(place)
+
+
+@MACHINES
+@pytest.mark.parametrize("files", [False, True])
+def test_two_machines_that_were_measured_at_places_of_their_own_are_told_apart(
+    machine: Callable[..., Simulated], files: bool
+) -> None:
+    rng = np.random.default_rng(11)
+    robot, q, true = machine(rng)
+    other = sides(q, rng, lean=4.0)
+    mixed = noisy(np.where(other[:, None], true(rng)(q), true(rng)(q)), rng)
+    data = [
+        measured(q[rows], mixed[rows], f"{name}.csv" if files else "")
+        for name, rows in (("one", ~other), ("other", other))
+    ]
+    assert "two-machines" in doubts(robot, *data)
+
+
+@MACHINES
+def test_rows_whose_places_differ_by_chance_are_not_elsewhere(
+    machine: Callable[..., Simulated],
+) -> None:
+    """Of few rows in no order, six actuators explain a third of any division into two groups."""
+    rng = np.random.default_rng(12)
+    robot, q, true = machine(rng)
+    q = q[: COUNT // 2] if q.shape[1] == 3 else q[: 2 * COUNT // 3]
+    other = sides(q, rng, lean=1.0)
+    mixed = noisy(np.where(other[:, None], true(rng)(q), true(rng)(q)), rng)
+    found = pk.identify(robot, measured(q, mixed))
+    (said,) = (each for each in found.verdict.said if each.check == "two-machines")
+    assert not said.finding.elsewhere and said.level == "doubt"
+
+
 def tips(read: Read, q: np.ndarray) -> np.ndarray:
     there = pk.screw.from_pose(read(q))
     return there[:, :3, :3] @ TIP + there[:, :3, 3]

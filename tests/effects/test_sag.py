@@ -20,7 +20,8 @@ from pkmcal.arrays import FloatArray
 from pkmcal.calibration.rigid import rigid_arm
 from pkmcal.diagnostics.waves import _alike, scan_waves
 from pkmcal.fitted.left_out import compared_by_poses
-from pkmcal.kinematics.calibratable import ArmMachine, as_machine
+from pkmcal.kinematics.arm_machine import ArmMachine
+from pkmcal.kinematics.calibratable import as_machine
 
 AXES = [[0, 0, 1], [0, 1, 0], [0, 1, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0]]
 POINTS = [[0, 0, 0], [0, 0, 290], [0, 0, 560], [0, 0, 630], [302, 0, 630], [374, 0, 630]]

@@ -29,6 +29,10 @@ class Machine:
         self.homed, self.stopped, self.mesh = True, False, "none"
         self.lines: list[str] = []
         self.looks = 0  # that a move lasts
+        self.dead = self.long = False
+        self.stuck = False  # it says ok, and does not move
+        self.session: int | None = None
+        self.sessions = 0
 
     def gcode(self, line: str) -> None:
         self.lines.append(line)
@@ -36,7 +40,9 @@ class Machine:
             self.stopped = True
         words = dict(_WORD.findall(line))
         if words.get("G") == "1" or "G1" in line:
-            self.looks = 3
+            if self.stuck:
+                return
+            self.looks = 10**6 if self.long else 3
             self.goal = np.array(
                 [float(words.get(axis, old)) for axis, old in zip("XYZ", self.goal, strict=True)]
             )
@@ -62,11 +68,20 @@ class _Duet(BaseHTTPRequestHandler):
         asked = {key: values[0] for key, values in parse_qs(parts.query).items()}
         if parts.path == "/rr_connect":
             good = asked["password"] == self.password
+            self.machine.sessions += good
+            self.machine.session = 4711 + self.machine.sessions
             said: dict[str, Any] = {"err": 0, "sessionTimeout": 8000, "boardType": "duet3",
-                                    "apiLevel": 1, "sessionKey": 4711}  # fmt: skip
+                                    "apiLevel": 1, "sessionKey": self.machine.session}  # fmt: skip
             return self._say(said if good else {"err": 1})
-        if self.headers.get("X-Session-Key") != "4711":
+        if self.headers.get("X-Session-Key") != str(self.machine.session):
             return self.send_error(401)
+        if parts.path == "/rr_reply":
+            body = b"Error: G1: target position outside machine limits\n"
+            self.send_response(200)
+            self.send_header("Content-Length", str(len(body)))
+            self.end_headers()
+            self.wfile.write(body)
+            return None
         if parts.path == "/rr_gcode":
             self.machine.gcode(asked["gcode"])
             return self._say({"buff": 255})
@@ -134,6 +149,8 @@ class _Grbl(socketserver.StreamRequestHandler):
         self._say("Grbl 3.7 [FluidNC v3.7.8 (wifi) '$' for help]")
         line = b""
         while byte := self.rfile.read(1):
+            if m.dead:
+                return
             if byte == b"?":
                 m.look()
                 state = (

@@ -48,7 +48,7 @@ def test_a_gauge_with_a_button_sends_one_line(terminal: tuple[int, str]) -> None
     os.write(master, b"+9.9999\r\n")  # pressed before it was asked: not this reading
     time.sleep(0.05)
     gauge = SerialGauge(port, MM)
-    later(master, b"+0.12", b"34\r\n")
+    later(master, b"+0.12", b"34\r\n", pause=0.4)  # a person's finger is slower than a line
     np.testing.assert_array_equal(gauge.read(""), [0.1234])
     gauge.close()
 
@@ -61,6 +61,39 @@ def test_of_a_gauge_that_sends_by_itself_no_half_line_is_read(terminal: tuple[in
     # what was sent before it was asked is gone, and "234" would be a number
     np.testing.assert_array_equal(gauge.read(""), [0.1235])
     gauge.close()
+
+
+class Port:
+    """A port at which bytes arrive, None where nothing comes for a while."""
+
+    timeout = 0.0
+
+    def __init__(self, *sent: bytes | None) -> None:
+        self.bytes = [byte for part in sent for byte in ([None] if part is None else part)]
+
+    def reset_input_buffer(self) -> None: ...
+
+    def read(self, count: int) -> bytes:
+        byte = self.bytes.pop(0)
+        return b"" if byte is None else bytes([byte])
+
+
+@pytest.mark.parametrize(
+    ("sent", "number"),
+    [
+        ((b"2.34\r\n", b"+0.1235\r\n"), 0.1235),  # of +12.34: asked in the middle of a line
+        ((b"\n", b"+0.1235\r\n"), 0.1235),
+        ((b"\r\n", b"+0.1235\r\n"), 0.1235),
+        ((None, b"+0.1235\r\n", b"+9.9\r\n"), 0.1235),  # a button: nothing was on its way
+    ],
+)
+def test_of_a_gauge_that_is_not_asked_the_first_whole_line_is_read(
+    sent: tuple[bytes | None, ...], number: float
+) -> None:
+    """A second may go by from line to line: what came first is no line if it came at once."""
+    gauge = SerialGauge.__new__(SerialGauge)
+    gauge._port, gauge._name, gauge._question = Port(*sent), "x", ""
+    np.testing.assert_array_equal(gauge.read(""), [number])
 
 
 def test_a_gauge_that_is_asked(terminal: tuple[int, str]) -> None:
@@ -96,14 +129,30 @@ def test_a_gauge_that_is_pulled_out_is_said() -> None:
 @pytest.mark.parametrize(
     ("line", "number"),
     [(b"+0.1234", 0.1234), (b"-12,5 mm", -12.5), (b"01A+000.123", 0.123), (b"X 0.01in", 0.254),
-     (b"+ 3.5", 3.5), (b"D: 7", 7.0)],
+     (b"+ 3.5", 3.5), (b"D: 7 mm", 7.0)],
 )  # fmt: skip
 def test_lines_of_gauges(line: bytes, number: float) -> None:
     assert _number(line, "x") == pytest.approx(number, rel=1e-12)
 
 
 @pytest.mark.parametrize(
-    "line", [b"", b"ERR", b"1.2.3", b"1 2", b"+0.1 um", b"nan", b"0x10", b"1e5"]
+    "line",
+    [
+        b"",
+        b"ERR",
+        b"1.2.3",
+        b"1 2",
+        b"+0.1 um",
+        b"nan",
+        b"0x10",
+        b"1e5",
+        b"ERR 2",
+        b"Err0",
+        b"911",
+        b"Error 1.5",
+        b"234",
+        b"LOW BAT 1.0",
+    ],
 )
 def test_lines_that_are_no_single_number_are_refused(line: bytes) -> None:
     with pytest.raises(DeviceError, match="no single number"):
@@ -154,8 +203,29 @@ def test_the_line_that_is_added_to_a_folder_is_the_reading(tmp_path: Path) -> No
         WatchedFolder(str(export), MM)
 
 
+def test_a_file_that_is_written_anew_is_read_from_its_beginning(tmp_path: Path) -> None:
+    """Longer than before, what stands behind its former end is no reading: 4, of 1.0034."""
+    one = WatchedFolder(str(tmp_path), MM)
+    last = tmp_path / "last.txt"
+    last.write_text("1.00\n")
+    threading.Timer(0.3, last.write_text, ("1.0034\n",)).start()
+    np.testing.assert_array_equal(one.read(""), [1.0034])
+    threading.Timer(0.3, last.write_text, ("1.0035\n",)).start()  # as long as before
+    np.testing.assert_array_equal(one.read(""), [1.0035])
+    threading.Timer(0.3, last.write_text, ("1.00\n",)).start()
+    np.testing.assert_array_equal(one.read(""), [1.0])
+
+
+def test_a_folder_that_is_gone_is_said(tmp_path: Path) -> None:
+    (tmp_path / "in").mkdir()
+    gone = WatchedFolder(str(tmp_path / "in"), MM)
+    threading.Timer(0.2, (tmp_path / "in").rmdir).start()
+    with pytest.raises(DeviceError, match="folder"):
+        gone.read("")
+
+
 def test_a_person_is_asked_until_a_number_is_typed() -> None:
-    typed = iter(["", "x", "1 2", "inf", "0.5"])
+    typed = iter(["", "x", "1 2", "inf", "1e200", "0.5"])
     questions: list[str] = []
 
     def ask(question: str) -> str:
@@ -163,7 +233,7 @@ def test_a_person_is_asked_until_a_number_is_typed() -> None:
         return next(typed)
 
     np.testing.assert_array_equal(PersonReads("", MM, ask).read("row 1"), [0.5])
-    assert questions[0] == "row 1: " and len(questions) == 5
+    assert questions[0] == "row 1: " and len(questions) == 6
     assert np.isnan(PersonReads("", MM, lambda _: " - ").read("")).all()
     pose = PersonReads("", ("mm", "rad"), lambda _: "3, 90").read("")
     np.testing.assert_allclose(pose, [3.0, np.pi / 2])

@@ -32,6 +32,7 @@ STATED: dict[str, Any] = {
     "tension": RANDOM.uniform(10, 20, (ROWS, N)),
     "tension_sigma": RANDOM.uniform(0.1, 0.2, (ROWS, N)),
     "load": RANDOM.uniform(1, 2, (ROWS, 10)),
+    "beside": {"current": RANDOM.normal(size=ROWS), "x": [1.5, 2.0 / 3.0, 0.0, 1e-300, -2.0]},
     "lines": np.arange(2, ROWS + 2),
 }
 
@@ -140,3 +141,18 @@ def test_what_no_column_can_hold_is_not_written(tmp_path: Path) -> None:
     with pytest.raises(pk.ArgumentError, match="lens of 'camera' is of class list"):
         m.write(tmp_path / "m.csv")
     assert not (tmp_path / "m.csv").exists()
+
+
+def test_numbers_beside_a_reading_keep_the_spelling_of_their_names(tmp_path: Path) -> None:
+    m = Measurements(np.ones((2, N)), np.ones((2, 3)), beside={"Motor_A": [np.nan, 2.0]})
+    m.write(tmp_path / "m.csv")
+    again = pk.read_measurements(tmp_path / "m.csv")
+    assert again.beside.dtype.names == ("Motor_A",) and again.notes == ()
+    assert again.select([1]).beside["Motor_A"].tolist() == [2.0]
+    for wrong, message in (
+        ([1.0, 2.0], r"^beside must be numbers of the rows by their names"),
+        ({"motor a": [1.0, 2.0]}, r"^beside: names are letters, digits and _"),
+        ({"a": [1.0, 2.0, 3.0]}, r"^beside: a must have shape \(2,\); found \(3,\)"),
+    ):
+        with pytest.raises(pk.ArgumentError, match=message):
+            Measurements(np.ones((2, N)), np.ones((2, 3)), beside=wrong)

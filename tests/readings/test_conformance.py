@@ -16,7 +16,7 @@ from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.free_parameters import parameters
 from pkmcal.estimation.parameters import Asked
 from pkmcal.estimation.starts import with_starts
-from pkmcal.readings import At, Predicted, always
+from pkmcal.readings import At, Predicted, Start, always
 from pkmcal.readings.registry import KINDS, require_own_columns
 
 from ..simulated import with_errors
@@ -237,11 +237,19 @@ class String(Loop):
 
     def dependences(self, data: Any) -> Any:
         names = self.loop[:1] if self.wrong == "names" else self.loop
-        yield always("zero", "loop", (("zero", "mm"),), list(names), data.starts)
+        made = always("zero", "loop", (("zero", "mm"),), list(names), data.starts)
+        return {"depend": ("zero",), "none": None}.get(self.wrong, (made,))
 
     def starts(self, machine: Any, sets: Any, found: Any) -> None:
         if self.wrong != "starts":
             super().starts(machine, sets, found)
+        changed = {
+            "nan": ((0,), [np.nan]),
+            "size": ((0, 1), [1.0]),
+            "slots": ((3,), [1.0]),
+        }
+        if self.wrong in changed:
+            found["loop", "A"] = Start(*changed[self.wrong])
 
 
 @pytest.mark.parametrize(
@@ -249,6 +257,11 @@ class String(Loop):
     [
         ("predict", r"predict of 'string' must return Predicted\(…\); found tuple"),
         ("names", "zero: the dependence on it has 1 names .* each of 20 rows"),
+        ("depend", "String: dependences has to yield objects of Dependence, .* found str"),
+        ("none", "String: dependences has to yield objects of Dependence, .* found NoneType"),
+        ("nan", "the search for loop.A.zero has a start that is no finite number"),
+        ("size", r"Start: 2 slots \(0, 1\) need as many values; found shape \(1,\)"),
+        ("slots", r"zero: the start of loop 'A' has slots \(3,\), and the argument 1 numbers"),
         ("starts", r"zero: the search for loop 'A' has no start: .* found\['loop', 'A'\]"),
     ],
 )
@@ -278,7 +291,13 @@ def test_a_class_without_name_or_components_or_with_those_of_other_columns_is_na
         "pairs": ({"components": ("mm",)}, "Wrong has to state its components"),
         "time": ({"components": (("time", "s"),)}, "Wrong calls a column 'time'"),
         "q1": ({"components": (("q1", "mm"),)}, "Wrong calls a column 'q1'"),
-        "label": ({"components": (("l", "mm"),), "labels": ("session",)}, "a column 'session'"),
+        "label": ({"labels": ("thread",)}, r"labels of .* 'thread', which is no field .* loop"),
+        "word": ({"labels": "loop"}, "labels of the class Wrong has to be a tuple of names"),
+        "per row": ({"per_row": ("wire",)}, "per_row of the class Wrong names 'wire'"),
+        "nouns": ({"nouns": ("loop",)}, "nouns of the class Wrong are one and several"),
+        "turning": ({"turning": 0}, "turning of the class Wrong is the first of its last three"),
+        "predict": ({"predict": pk.readings.Reading.predict}, "has no method predict"),
+        "init": ({"__init__": lambda self, loop: None}, "Wrong has to be a dataclass"),
     }
     for members, message in wrong.values():
         reading = type("Wrong", (Loop,), {"name": "wrong", **members})(["A"] * 3)

@@ -1,5 +1,6 @@
 // What was measured: files as they lie there, and as they are understood.
 import { dropping } from './app.js'
+import { live } from './live.js'
 import { again, app, button, change, choice, field, go, made, refresh, tick, work } from './frame.js'
 
 export async function measure(main) {
@@ -46,6 +47,7 @@ export async function measure(main) {
     })
   }
   await show()
+  await live(made('section', main))
   return show
 }
 

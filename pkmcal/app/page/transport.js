@@ -13,7 +13,7 @@ export const ENDED = 'The server of this window does not answer: it was ended in
 async function ask(path, settings = {}) {
   const answer = await fetch(path, { ...settings, headers }).catch(() => { throw Error(settings.method === 'PUT' ? `This cannot be read, or the server ended: ${settings.body.name}` : ENDED) })
   if (answer.status === 401) throw Error('This page has no right to this server: open it from the terminal again.')
-  if (!answer.ok && answer.status !== 409) throw Error((await answer.json().catch(() => ({}))).error ?? `${answer.status}`)
+  if (!answer.ok && (answer.status !== 409 || path.startsWith('/api/live'))) throw Error((await answer.json().catch(() => ({}))).error ?? `${answer.status}`)
   return answer
 }
 
@@ -39,6 +39,12 @@ export async function send(file) {
 }
 
 export const run = (operation, given) => post(`/api/run/${operation}`, given).then(lines)
+
+// A measurement with a machine: what happens, line by line, and what is said to it.
+export const measuring = asked => post('/api/live', asked).then(lines)
+export const start = name => post(`/api/live/${name}/start`)
+export const typed = (name, number, text) => post(`/api/live/${name}/type`, { number, text })
+export const stop = () => post('/api/live/stop')
 
 export async function* changes() {
   for await (const message of lines(await ask('/api/events'))) if (message.changed && message.by !== tab) yield message
