@@ -196,6 +196,7 @@ def test_an_imported_printer_is_planned_for_its_own_probe_on_its_bed(tmp_path: P
         page.get_by_role("button", name="Choose poses").click()
         page.locator("main.plan .pkmcal-view.moves").wait_for()
         assert 'kind = "probe"' in (served.folder / "project.toml").read_text()
+        assert "predicted error along z" in page.locator("main.plan").inner_text()
         with page.expect_download():
             page.get_by_role("button", name="Save plan/poses.csv").click()
         robot = pk.load(served.folder / "machine" / "robot.toml")
