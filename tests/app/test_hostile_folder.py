@@ -136,7 +136,7 @@ def test_readings_that_were_written_into_a_plan_outlive_the_next_plan(tmp_path: 
         take_hexapod(page)
         page.get_by_role("button", name="2 Plan").click()
         page.get_by_label("poses", exact=True).fill("8")
-        page.locator("p.state", has_text="measure 8 poses").wait_for()
+        page.locator("p.lead", has_text="measure 8 poses").wait_for()
         file = served.folder / "plan" / "commands.csv"
         filled = file.read_text().replace("\n", ",1.0\n")
         file.write_text(filled)
