@@ -157,9 +157,7 @@ class Table:
     ) -> list[tuple[int, list[str]]]:
         """The rows of the table with their lines, each as wide as the header."""
         names = header.headings
-        rows = [
-            (line, _fitted(cells, names, packed)) for line, cells in header.rows if any(cells)
-        ]
+        rows = [(line, _fitted(cells, names, packed)) for line, cells in header.rows if any(cells)]
         again = {line: None for line, cells in rows if cells == names}
         if again and header.line:
             self.notes.append(f"column names once more in line {next(iter(again))}, left out")
