@@ -74,6 +74,9 @@ def tool_places(
                 f" {np.degrees(otherwise):.2g} deg with left and right exchanged; take"
                 " pictures without mirroring, or state u as the width less 1 less u"
             )
+    many = np.bincount(picture) >= _MANY
+    if many.sum() <= _FEWEST or disagreement(places[many], pose[many]) <= _OFF:
+        return places
     trials = {"with the camera on the other of base and platform": (not rides, pose)}
     for how, rows in (("next", 1), ("previous", -1)):
         trials[f"with the actuators of the {how} picture"] = rides, np.roll(pose, -rows, axis=0)
