@@ -1,6 +1,7 @@
 """What a machine and an instrument have to answer, so that a measurement can be made with them.
 
-A kind of machine or instrument is one file with one class, named in `registry`.
+A kind of machine or instrument is one file with one class, named in `registry`. One that asks a
+person has ``ASKS = True`` and takes a third argument: what asks, a terminal or a page.
 """
 
 from __future__ import annotations
