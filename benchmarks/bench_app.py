@@ -105,6 +105,7 @@ def main() -> None:
                 f"memory: server {memory(served.process.pid):.0f} MB, worker after a report"
                 f" {memory(worker):.0f} MB"
             )
+            ask.take({"machine": {"builtin": "hexapod"}, "measured": {"files": ["m180.csv"]}})
             stops, again, used = [], [], []
             for _ in range(ROUNDS):
                 waits = ready(ask)
@@ -123,9 +124,21 @@ def main() -> None:
                 used.append(processor_seconds(waits) - before)
             report.text(
                 f"Stop: {1e3 * statistics.median(stops):.0f} ms until the answer; the next fit, of"
-                f" {rows} rows, {statistics.median(again):.2f} s after it, of which"
+                f" 180 rows, {statistics.median(again):.2f} s after it, of which"
                 f" {statistics.median(used):.2f} s of the process that waited"
             )
+            if browser.CHROMIUM is not None:
+                report.text(f"first paint: {painted(served):.0f} ms after the address was given")
+
+
+def painted(served: browser.Served) -> float:
+    """Median of the times until the page shows something, ms; by Chromium's own clock."""
+    found = []
+    for _ in range(ROUNDS):
+        with browser.page_of(served) as page:
+            entry = "performance.getEntriesByName('first-contentful-paint')[0].startTime"
+            found.append(float(page.evaluate(entry)))
+    return statistics.median(found)
 
 
 def ready(ask: Asking) -> int:

@@ -1,9 +1,12 @@
-"""Sets aside what somebody has changed in a file that the window is about to write again."""
+"""Keeps what somebody else has put into a file that the window writes."""
 
 from __future__ import annotations
 
+import filecmp
+import hashlib
 import shutil
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from itertools import chain, count
 from pathlib import Path
 
@@ -16,21 +19,48 @@ def free_place(wanted: Path) -> Path:
     return next(each for each in chain([wanted], numbered) if not each.exists())
 
 
-def set_aside(paths: Iterable[Path]) -> list[str]:
-    """Copy files that are not as they were written into the project's folder, and say so.
+class Kept:
+    """What was written here; other contents are kept when these files are written again.
 
-    There the window offers them: a machine as another machine, a table as measurements. Files of
-    a kind that cannot say whether it was changed, such as a printer's configuration, are left out.
+    A file with a seal says by itself whether it was changed. Of others, such as a printer's
+    configuration, a process knows what it wrote.
     """
-    said = []
-    for path in paths:
-        if not path.is_file() or not has_seals(path.suffix):
-            continue
-        if not is_sealed(path.read_bytes(), path.suffix):
-            copy = free_place(Path(f"my_{path.name}"))
-            shutil.copy2(path, copy)
-            said.append(
-                f"{path.as_posix()} was changed since it was written, and is written again: what"
-                f" was in it is kept as {copy}"
-            )
-    return said
+
+    def __init__(self) -> None:
+        self._own = set[str]()
+
+    @contextmanager
+    def aside(self, paths: Iterable[Path]) -> Iterator[list[str]]:
+        """Write these files within the block; at its end a sentence of each that was another's.
+
+        Its content is kept in the project's folder, where the window offers it: a machine as
+        another machine, a table as measurements.
+        """
+        paths = list(paths)
+        copies = {
+            path: Path(shutil.copy2(path, free_place(Path(f"my_{path.name}"))))
+            for path in paths
+            if path.is_file() and not self._is_own(path)
+        }
+        said: list[str] = []
+        try:
+            yield said
+        finally:
+            for path, copy in copies.items():
+                if path.is_file() and filecmp.cmp(path, copy, shallow=False):
+                    copy.unlink()
+                else:
+                    said.append(
+                        f"{path.as_posix()} was not as it had been written, and was written again:"
+                        f" what was in it is kept as {copy}"
+                    )
+            self._own |= {_digest(each) for each in paths if each.is_file()}
+
+    def _is_own(self, path: Path) -> bool:
+        if has_seals(path.suffix):
+            return is_sealed(path.read_bytes(), path.suffix)
+        return _digest(path) in self._own
+
+
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()

@@ -19,7 +19,7 @@ from typing import Any, get_args
 
 import pkmcal as pk
 from pkmcal.app import looking, taking, telling
-from pkmcal.app.aside import set_aside
+from pkmcal.app.aside import Kept
 from pkmcal.app.commands import PLAN, REPORT, export, offered
 from pkmcal.app.folder import named
 from pkmcal.app.names import safe_name
@@ -65,6 +65,7 @@ class Work:
     notes: list[str] = field(default_factory=list)
     found: pk.Identification | None = None
     fitted: object = None
+    kept: Kept = field(default_factory=Kept)
 
     def read(self, project: Project) -> calibrating.Sources:
         """Read the files of a calibration, if they or what is asked of them changed."""
@@ -122,9 +123,10 @@ def machine(work: Work, state: Table, given: Table, say: Say) -> Table:
             say("reading the configuration")
             printer = importing.run(project.importing, inputs)
             paths = [Path(project.importing.out) / name for name in importing.files(printer)]
-            found["notes"] = [*str(printer).splitlines(), *set_aside(paths)]
+            with work.kept.aside(paths) as aside:
+                importing.write(project.importing, printer, inputs, force=True)
+            found["notes"] = [*str(printer).splitlines(), *aside]
             found["machines"] = _machines(project)
-            importing.write(project.importing, printer, inputs, force=True)
             found["stored"] = [str(each) for each in paths[1:]]
         robot = pk.load(inputs.robot(project.calibration.robot))
     except (Error, OSError) as error:
@@ -161,8 +163,7 @@ def plan(work: Work, state: Table, given: Table, say: Say) -> Table:
     say("choosing poses", 0.1)
     made = planning.planned(project.plan, sources)
     output = Output(Path(PLAN), planning.files(project.plan), inputs, True)
-    said = set_aside(output.paths)
-    with output.draft() as draft:
+    with work.kept.aside(output.paths) as said, output.draft() as draft:
         planning.write(project.plan, made, draft, inputs.comment())
     shown = page.machine(made.robot, cloud=False)
     shown["places"] = page.places("planned poses", made.robot, made.poses)
@@ -230,8 +231,8 @@ def out(work: Work, state: Table, given: Table, say: Say) -> Table:
     project = Project.of_table(state)
     found = work.fit(project)
     sources = work.read(project)
-    aside = set_aside([Path(REPORT) / "robot.toml"])
-    with Output(Path(REPORT), ["robot.toml"], work.inputs, True).draft() as draft:
+    output = Output(Path(REPORT), ["robot.toml"], work.inputs, True)
+    with work.kept.aside(output.paths) as aside, output.draft() as draft:
         save_robot(found, draft / "robot.toml", work.inputs, project.calibration.robot)
     files = [_file(f"{REPORT}/robot.toml", "the calibrated machine")]
     robot = sources.robot
@@ -249,8 +250,9 @@ def out(work: Work, state: Table, given: Table, say: Say) -> Table:
         try:
             if Path(name).resolve() in inputs:
                 raise ArgumentError(f"{name} is an input: give your file another name")
-            aside += set_aside([Path(name)])
-            said = str(exporting.run(job, Inputs(), force=True))
+            with work.kept.aside([Path(name)]) as others:
+                said = str(exporting.run(job, Inputs(), force=True))
+            aside += others
             file = _file("" if Path(name).is_dir() else name, f"{name}: {said}")
             files.append({**file, "target": asked.get(job.out)})
         except Error as error:
@@ -261,8 +263,8 @@ def out(work: Work, state: Table, given: Table, say: Say) -> Table:
                         for each in (job.config, name))  # fmt: skip
             changed += difflib.unified_diff(old, new, job.config, name, n=1, lineterm="")
     there = (*project.targets, own)
-    others = [(each.name, each.label) for each in offered(robot) if each.name not in there]
-    return {"files": files, "changed": changed, "targets": others, "said": aside,
+    offers = [(each.name, each.label) for each in offered(robot) if each.name not in there]
+    return {"files": files, "changed": changed, "targets": offers, "said": aside,
             "certificate": telling.stated(Path("certificate.toml")),
             "commands": [quoted(job.argv()) for job in exports]}  # fmt: skip
 

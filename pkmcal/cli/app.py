@@ -45,8 +45,9 @@ def app(
     try:
         from pkmcal.app.launch import launch
     except ImportError as error:
+        missing = str(error.name).partition(".")[0]
         raise ArgumentError(
-            f"pkmcal app needs {error.name}: python -m pip install starlette uvicorn"
+            f"pkmcal app needs {missing}: python -m pip install starlette uvicorn"
         ) from None
     launch(folder, say, browser, port)
     return 0

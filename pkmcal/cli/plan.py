@@ -48,7 +48,7 @@ def plan(
         typer.Option(
             metavar="X,Y,Z",
             help="In which direction of the base the error counts: z, of a printer's nozzle over"
-            " its bed. By default in all.",
+            " its bed. By default in all, of --kind probe in z.",
         ),
     ] = None,
     measured: Annotated[

@@ -104,15 +104,14 @@ class _Compliance(NamedTuple):
 
 
 def _compliances(found: Solution) -> list[_Compliance]:
-    """Estimated compliances of limbs and joints that the measurements determine."""
+    """Estimated compliances of limbs and joints; those that are determined, where any is."""
     of_each = zip(found.free, found.values, found.stderr, found.parameter_dof, strict=True)
-    return [
+    every = [
         _Compliance(name, *map(float, numbers))
         for name, *numbers in of_each
-        if name.startswith(COMPLIANCE.removesuffix("."))
-        and not name.endswith(PER_LENGTH)
-        and np.isfinite(numbers[1])
+        if name.startswith(COMPLIANCE.removesuffix(".")) and not name.endswith(PER_LENGTH)
     ]
+    return [each for each in every if np.isfinite(each.sigma)] or every
 
 
 def _alike(found: Solution) -> tuple[float, ...]:
@@ -128,7 +127,7 @@ def _alike(found: Solution) -> tuple[float, ...]:
 
 def _negative(found: Solution) -> tuple[_Compliance, ...]:
     """The compliance that is most clearly below 0, if none at 0 would be so by chance."""
-    known = [each for each in _compliances(found) if each.sigma > 0.0]
+    known = [each for each in _compliances(found) if 0.0 < each.sigma < np.inf]
     below = [
         (0.5 * t_tail(each.value / each.sigma, each.freedom), each)
         for each in known

@@ -148,11 +148,11 @@ def _squares(fit: Fit, missed: FloatArray, pose: np.ndarray) -> FloatArray:
 def _shift(fit: Fit, chosen: Parameters, plain: LeftOut, whole: LeftOut, kept: BoolArray) -> float:
     """Return by how many of their ± numbers that the fit determines move with the effect, rms."""
     place = {name: i for i, name in enumerate(fit.parameters.names)}
-    theirs = np.flatnonzero(kept)
-    both = [(place[chosen.names[i]], i) for i in theirs if chosen.names[i] in place]
-    mine, there = np.array(both, dtype=np.intp).T
     moved = np.zeros(len(place))
-    moved[mine] = (whole.found[theirs] - plain.found)[np.searchsorted(theirs, there)]
+    change = whole.found[kept] - plain.found
+    for name, by in zip(np.array(chosen.names)[kept].tolist(), change.tolist(), strict=True):
+        if name in place:
+            moved[place[name]] = by
     determined = np.linalg.norm(np.linalg.qr(fit.uncertainty.fit.back)[0], axis=1)
     deviation = np.sqrt(np.maximum(np.diag(fit.uncertainty.scaled), 0.0))
     known = np.isfinite(deviation) & (deviation > 0.0) & (determined > 1.0 - _INVOLVED)

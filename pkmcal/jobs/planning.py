@@ -133,6 +133,8 @@ def options(job: Planning, sources: Sources) -> dict[str, Any]:
     seen = as_machine(sources.robot)
     free = free_names(seen, job.free)
     kinds = kinds_of(job)
+    # a printer's own probe is for the height of its nozzle over the bed
+    direction = job.direction or ("z" if job.kind == PROBE else None)
     pictures = planned_camera(job) if kinds == "pixel" else None
     if pictures is None and (job.camera is not None or job.board is not None):
         raise ArgumentError("--camera, --board: they are of pictures; state --kind pixel")
@@ -147,7 +149,7 @@ def options(job: Planning, sources: Sources) -> dict[str, Any]:
         "free": free or None,
         "prior": read_prior(job.prior, seen, free),
         "unknown": [word("--unknown", each, UNKNOWN) for each in job.unknown],
-        "direction": None if job.direction is None else axis(job.direction),
+        "direction": None if direction is None else axis(direction),
     }
 
 

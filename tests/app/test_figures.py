@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -93,10 +95,16 @@ def test_one_change_makes_one_fit_in_each_tab(tmp_path: Path) -> None:
 
 
 def test_the_package_is_imported_without_what_serves(tmp_path: Path) -> None:
-    import subprocess
-    import sys
-
     code = "import pkmcal, sys; print({'starlette', 'uvicorn', 'asyncio'} & set(sys.modules))"
     done_ = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done_.stdout.strip() == "set()"
     assert pk.__name__ == "pkmcal"
+
+
+@pytest.mark.parametrize("missing", ["starlette", "uvicorn"])
+def test_without_what_serves_one_line_says_what_to_install(tmp_path: Path, missing: str) -> None:
+    code = f"import sys; sys.modules['{missing}'] = None; from pkmcal.cli.main import main; main()"
+    argv = [sys.executable, "-c", code, "app", str(tmp_path / "project")]
+    ended = subprocess.run(argv, capture_output=True, text=True, check=False, timeout=60)
+    assert ended.returncode == 2 and len(ended.stderr.splitlines()) == 1
+    assert f"pkmcal app needs {missing}: python -m pip install starlette uvicorn" in ended.stderr

@@ -196,6 +196,7 @@ def test_an_imported_printer_is_planned_for_its_own_probe_on_its_bed(tmp_path: P
         page.get_by_role("button", name="Choose poses").click()
         page.locator("main.plan .pkmcal-view.moves").wait_for()
         assert 'kind = "probe"' in (served.folder / "project.toml").read_text()
+        assert "predicted error along z" in page.locator("main.plan").inner_text()
         with page.expect_download():
             page.get_by_role("button", name="Save plan/poses.csv").click()
         robot = pk.load(served.folder / "machine" / "robot.toml")
@@ -273,3 +274,67 @@ def test_the_printers_way_goes_by_keyboard_alone(tmp_path: Path) -> None:
         page.locator("button[data-file='new.cfg']").wait_for()
         with page.expect_download():
             press("Save new.cfg")
+
+
+def test_the_metrologists_way_goes_by_keyboard_alone(tracked: Path, tmp_path: Path) -> None:
+    with browser.served(tmp_path / "project") as served, browser.page_of(served) as page:
+
+        def focused(name: str, key: str = "Tab") -> None:
+            """Go to what has this name."""
+            told = "(e => e.ariaLabel || e.labels?.[0]?.textContent || e.textContent)"
+            for _ in range(150):
+                if page.evaluate(f"{told}(document.activeElement)") == name:
+                    return
+                page.keyboard.press(key)
+            raise AssertionError(f"{key} does not reach {name!r}")
+
+        def press(name: str, key: str = "Tab") -> None:
+            focused(name, key)
+            page.keyboard.press("Enter")
+
+        press("hexapod")
+        page.locator(".pkmcal-view.moves").wait_for()
+        press("3 Measure", "Shift+Tab")
+        page.locator("main.measure h1").wait_for()
+        page.set_input_files("input[type=file]", [tracked / "tracker.csv", tracked / "log.csv"])
+        page.locator("li", has_text="log.csv").wait_for()
+        press("remove tracker.csv")  # which leaves the log alone, and comes back as the second
+        press("is the controller’s log")
+        page.locator("li", has_text="log.csv: the controller’s log").wait_for()
+        page.set_input_files("input[type=file]", tracked / "tracker.csv")
+        page.locator("pre", has_text="90 measured positions").wait_for()
+        press("Calibrate")
+        fits(page, 1)
+        before = (served.folder / "project.toml").read_bytes()
+        for count, line in ((2, 19), (3, 54)):
+            focused(f"use tracker.csv line {line}", "Tab" if count == 2 else "Shift+Tab")
+            page.keyboard.press("Space")
+            fits(page, count)
+        assert page.locator("tr.odd").count() == 0
+        assert page.locator("tr.out td:last-child").all_inner_texts() == ["left out"] * 2
+        for count in (4, 5):
+            press("Undo", "Shift+Tab")
+            fits(page, count)
+        assert (served.folder / "project.toml").read_bytes() == before
+
+
+def test_what_is_touched_is_large_enough_but_in_tables(tmp_path: Path) -> None:
+    viewport = {"width": 390, "height": 844}
+    small = """() => [...document.querySelectorAll('button, select, input, summary, .button')]
+      .filter(one => one.offsetParent && !one.closest('table, .pkmcal-view'))
+      .map(one => one.closest('label.tick, label.field') ?? one)
+      .filter(one => { const { width, height } = one.getBoundingClientRect()
+        return Math.min(width, height) > 1 && height < 34 })
+      .map(one => one.outerHTML.slice(0, 120))"""
+    with (
+        browser.served(tmp_path / "project") as served,
+        browser.page_of(served, viewport=viewport) as page,
+    ):
+        page.set_input_files("input[type=file]", PRINTER)
+        page.get_by_role("button", name="Calibrate with what it has stored").click()
+        fits(page, 1)
+        for step in ("1 Machine", "2 Plan", "3 Measure", "4 Result", "5 Take away"):
+            page.get_by_role("button", name=step, exact=True).click()
+            page.locator(f"main.{page.evaluate('workbench.step')} h1").wait_for()
+            page.wait_for_timeout(1500)
+            assert page.evaluate(small) == [], step

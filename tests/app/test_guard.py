@@ -50,7 +50,7 @@ def ask(
     headers: dict[str, str] | None = None,
     token: bool = True,
 ) -> tuple[int, dict[str, str], bytes]:
-    connection = http.client.HTTPConnection("127.0.0.1", served.port, timeout=20)
+    connection = http.client.HTTPConnection("127.0.0.1", served.port, timeout=120)
     given = {"x-pkmcal-token": served.token} if token else {}
     connection.request(method, path, body, {**given, **(headers or {})})
     answer = connection.getresponse()

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from pkmcal.app.aside import set_aside
+from pkmcal.app.aside import Kept
 from pkmcal.files.seal import sealed
 from pkmcal.jobs.calibration import Calibration
 from pkmcal.jobs.configuration import Importing
@@ -80,12 +80,39 @@ def test_what_was_changed_in_a_written_file_is_kept(
     written = sealed(b"z [mm]\n1\n", ".csv")
     Path("plan").mkdir()
     Path("plan/poses.csv").write_bytes(written)
-    assert set_aside([Path("plan/poses.csv"), Path("plan/none.csv")]) == []
+    kept, paths = Kept(), [Path("plan/poses.csv"), Path("plan/none.csv")]
+    with kept.aside(paths) as said:
+        paths[0].write_bytes(sealed(b"z [mm]\n2\n", ".csv"))
+    assert said == [] and not list(Path().glob("my_*"))
     for k, name in enumerate(("my_poses.csv", "my_poses.1.csv")):
-        Path("plan/poses.csv").write_bytes(written + b"%d\n" % k)
-        (said,) = set_aside([Path("plan/poses.csv")])
-        assert said.endswith(f"kept as {name}")
+        paths[0].write_bytes(written + b"%d\n" % k)
+        with kept.aside(paths) as said:
+            paths[0].write_bytes(written)
+        assert len(said) == 1 and said[0].endswith(f"kept as {name}")
         assert Path(name).read_bytes() == written + b"%d\n" % k
+
+
+def test_a_configuration_that_the_window_did_not_write_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    kept, path = Kept(), Path("new.cfg")
+    path.write_text("mine")
+    for content, names in (("one", 1), ("two", 1), ("two", 1)):
+        with kept.aside([path]) as said:
+            path.write_text(content)
+        assert len(list(Path().glob("my_*"))) == names and bool(said) == (content == "one")
+    assert Path("my_new.cfg").read_text() == "mine"
+    with Kept().aside([path]) as said:  # another process, which writes the same
+        path.write_text("two")
+    assert not said and len(list(Path().glob("my_*"))) == 1
+    with pytest.raises(OSError), kept.aside([path]):
+        path.write_text("three")
+        raise OSError
+    path.write_text("mine again")
+    with pytest.raises(OSError), kept.aside([path]) as said:
+        raise OSError  # before it was written: it stands where it stood
+    assert not said and len(list(Path().glob("my_*"))) == 1
 
 
 def test_an_imported_machine_that_was_edited_is_kept_and_can_be_taken(tmp_path: Path) -> None:
@@ -93,7 +120,7 @@ def test_an_imported_machine_that_was_edited_is_kept_and_can_be_taken(tmp_path: 
     importing = Importing("printer.cfg", "machine")
     with browser.served(tmp_path) as served:
         take(served, Project(Calibration("machine/robot.toml"), importing=importing))
-        assert not any("changed since" in note for note in done(served, "machine")["notes"])
+        assert not any("written again" in note for note in done(served, "machine")["notes"])
         file = tmp_path / "machine" / "robot.toml"
         edited = file.read_text().replace("rod = 340.0", "rod = 341.0", 1)
         file.write_text(edited)
@@ -109,7 +136,7 @@ def test_readings_that_were_written_into_a_plan_outlive_the_next_plan(tmp_path: 
         take_hexapod(page)
         page.get_by_role("button", name="2 Plan").click()
         page.get_by_label("poses", exact=True).fill("8")
-        page.locator("p.state", has_text="measure 8 poses").wait_for()
+        page.locator("p.lead", has_text="measure 8 poses").wait_for()
         file = served.folder / "plan" / "commands.csv"
         filled = file.read_text().replace("\n", ",1.0\n")
         file.write_text(filled)

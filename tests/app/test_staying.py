@@ -144,15 +144,15 @@ def test_a_plan_is_made_again_while_its_fields_change(tmp_path: Path) -> None:
         page.get_by_role("button", name="2 Plan").click()
         count = page.get_by_label("poses", exact=True)
         count.press_sequentially("12", delay=20)
-        page.locator("p.state", has_text="measure 12 poses").wait_for()
+        page.locator("p.lead", has_text="measure 12 poses").wait_for()
         count.fill("8")
-        page.locator("p.state", has_text="measure 8 poses").wait_for()
+        page.locator("p.lead", has_text="measure 8 poses").wait_for()
         assert count.evaluate("field => field === document.activeElement")
         page.get_by_label("within, such as z=0:300").fill("radius=0:60")
         page.locator("#terminal pre", has_text="--within radius=0:60").wait_for()
         page.get_by_label("noise of the actuators, mm or rad").fill("0.5")
         page.locator("#terminal pre", has_text="--actuator-noise 0.5").wait_for()
-        page.locator("p.state", has_text="measure 8 poses").wait_for()
+        page.locator("p.lead", has_text="measure 8 poses").wait_for()
         (argv,) = commands(page, "2 Plan")
         assert "--actuator-noise" in argv and "radius=0:60" in argv
         page.emulate_media(media="print")
@@ -220,7 +220,7 @@ def test_a_plan_can_be_taken_along_as_a_program(tmp_path: Path) -> None:
         page.locator("#trouble", has_text="found 'x'").wait_for()
         page.get_by_label("it waits at each, s").fill("20")
         page.locator("#terminal pre", has_text="--gcode klipper --dwell 20").wait_for()
-        page.locator("section:not([inert]) p.state", has_text="measure 8 poses").wait_for()
+        page.locator("section:not([inert]) p.lead", has_text="measure 8 poses").wait_for()
         with page.expect_download() as taken:
             page.get_by_role("button", name="Save plan/poses.gcode").click()
         assert Path(taken.value.path()).read_text().count("G4 P20000") == 8

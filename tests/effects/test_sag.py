@@ -330,6 +330,14 @@ def test_numbers_move_by_sag_as_far_as_is_said() -> None:
     np.testing.assert_allclose(finding.comparison.shift, np.sqrt(np.mean(np.square(moved))), 0.02)
 
 
+def test_sag_alone_may_be_found() -> None:
+    """Of an arm whose errors are known: nothing else moves."""
+    m = measured(commands(40, 11), ARM, 12, 0.2 * SOFT, frame=NOWHERE)
+    found = pk.identify(ARM, m, fix="joint*", effects=[pk.Sag("all")])
+    assert found.verdict.state == "calibrated"
+    assert any("the arm sags" in each for each in found.verdict.remarks)
+
+
 def test_the_arm_without_laws_is_the_better_of_two() -> None:
     m = measured(commands(40, 60), built(8), 61, SOFT)
     found = pk.identify(ARM, m, effects=[pk.Sag()], **UNKNOWN)

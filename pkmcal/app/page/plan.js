@@ -72,7 +72,7 @@ export async function plan(main) {
       button(takes, 'Print a sheet to fill in', () => print())
       answer.append(split)
       const words = made('div', split)
-      for (const [k, text] of found.words.entries()) made('p', words, { className: k ? 'note' : 'state', text })
+      for (const [k, text] of found.words.entries()) made('p', words, { className: k ? 'note' : 'lead', text })
       made('pre', words, { text: found.table, tabindex: 0 })
       sheet(answer, found.sheet)
     })
