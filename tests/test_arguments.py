@@ -39,6 +39,7 @@ WRONG: dict[str, list[Any]] = {
     "names": [3, 2.5, [3], np.zeros((2, 2)), "nonsense", ["nonsense"], object()],
     "robot": [None, "hexapod", 3, MEASURED],
     "parallel": [None, "hexapod", 3, ARM],
+    "machine": [None, "hexapod", 3],
     "measurements": [None, 3, "abc", [3], [None]],
     "identification": [None, 3, ROBOT],
     "path": [None, 3, 2.5, ["abc"], object()],
@@ -198,12 +199,12 @@ CALLS: dict[str, Call] = {
     "stiffness": (
         pk.stiffness,
         {"robot": YIELDING, "poses": POSES, "at": np.zeros(3)},
-        {"robot": "parallel", "poses": "numbers", "at": "numbers"},
+        {"robot": "machine", "poses": "numbers", "at": "numbers"},
     ),
     "compliance_table": (
         pk.compliance_table,
         {"robot": YIELDING, "pose": POSES[0], "rated": 500.0},
-        {"robot": "parallel", "pose": "numbers", "rated": "positive"},
+        {"robot": "machine", "pose": "numbers", "rated": "positive"},
     ),
     "sensitivity": (
         pk.sensitivity,

@@ -31,6 +31,7 @@ from pkmcal.display import Table, fixed
 from pkmcal.exceptions import ArgumentError, FileError
 from pkmcal.files.reading import Input
 from pkmcal.geometry.carried import Load
+from pkmcal.geometry.elastic import require_compliance
 from pkmcal.result import Result
 
 _SAME = 1e-9  # mm, and mm per rad: by so much the arm of a source may differ
@@ -292,14 +293,16 @@ class SerialArm(SerialChain, Result):
         Raises
         ------
         ValueError, TypeError
-            A joint that it has not, an arm with slides, a compliance below 0.
+            A joint that it has not, an arm with slides, a compliance below 0, or a stiffness.
         """
         laws = self.weighed().joint_laws
         values = dict(laws.numbers)
         for joint, each in compliance.items():
             if not 1 <= instance("joint", joint, int) <= self.n_joints:
                 raise ArgumentError(f"compliance: joints are 1 to {self.n_joints}; found {joint}")
-            values[Term(joint - 1, "compliance")] = number("compliance", each, least=0.0)
+            what = f"compliance of joint {joint}"
+            values[Term(joint - 1, "compliance")] = number(what, each, least=0.0)
+            require_compliance(what, each, "N m/rad", 1e-3)
         laws = laws.with_terms(values)
         return self.with_laws(laws.with_values(np.array([values[term] for term in laws.terms])))
 

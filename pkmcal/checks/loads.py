@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from pkmcal.arms.arm import SerialArm
-from pkmcal.checks.finding import Finding
+from pkmcal.checks.finding import Finding, named
 from pkmcal.geometry.elastic import COMPLIANCE, PER_LENGTH
 from pkmcal.kinematics.robot import Robot
 
@@ -32,6 +32,7 @@ def sags(robot: Robot) -> Iterator[Finding]:
                 f"{name} is {value:.3g}, below 0: no spring",
                 "a calibration may find that of what does not yield; hold it at 0",
             )
+    yield from _several_springs(robot)
     home = robot.home
     found = robot.forward(robot.rigid.inverse(home, match=True), guess=home)
     sag = float(np.linalg.norm(found.pose[:3] - home[:3]))
@@ -41,6 +42,27 @@ def sags(robot: Robot) -> Iterator[Finding]:
     yield Finding(
         "load", (), f"at home the machine {what} under the load that its file states", _UNITS
     )
+
+
+def _several_springs(robot: Robot) -> Iterator[Finding]:
+    """Yield limbs on one actuator whose drives yield each by itself."""
+    elastic = robot.model.elastic
+    assert elastic is not None
+    own = {f"offset{i + 1}": limb.actuator for i, limb in enumerate(robot.model.limbs)}
+    springs = [each.number for each in elastic.springs if each.of_drive and each.number in own]
+    for actuator in sorted({own[name] for name in springs}):
+        mine = [name for name in springs if own[name] == actuator]
+        if len(mine) < 2:
+            continue
+        limbs = tuple(int(name.removeprefix("offset")) for name in mine)
+        yield Finding(
+            "load",
+            limbs,
+            f"{named(i - 1 for i in limbs)} share actuator {actuator + 1}, and the drive of each"
+            " yields by itself",
+            "one screw or crank under all of them is a parameter: screw = 0.0 under [parameters],"
+            ' offset = "screw" in each limb, and screw = 5e-5 under [compliance]',
+        )
 
 
 def arm_sags(arm: SerialArm) -> Iterator[Finding]:

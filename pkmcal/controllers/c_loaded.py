@@ -28,9 +28,8 @@ def holds(robot: Robot) -> bool:
     model = robot.model
     if model.elastic is None or model.chains is not None or model.driven:
         return False
-    numbers = [spring.number for spring in model.elastic.springs]
     alone = robot.n_actuators == len(model.limbs)
-    return alone and all(number.startswith("offset") for number in numbers)
+    return alone and all(spring.of_drive for spring in model.elastic.springs)
 
 
 def not_held(robot: Robot) -> Loss | None:

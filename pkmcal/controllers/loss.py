@@ -25,22 +25,40 @@ class Loss:
     Attributes
     ----------
     rms, worst : float
-        Mm.
+        Mm, at the poses that the model has; infinite where it has none of them.
     over : str
         Over which workspace.
+    lacking : float
+        Share of the poses that the model, or the machine under its load, does not have.
     """
 
     rms: float
     worst: float
     over: str
+    lacking: float = 0.0
+
+    @classmethod
+    def of(cls, off: FloatArray, over: str) -> Loss:
+        """The loss by how far poses are off (N, 3), mm; NaN where there is none."""
+        size = np.linalg.norm(off, axis=1)
+        known = np.isfinite(size)
+        if not known.any():
+            return cls(np.inf, np.inf, over, 1.0)
+        return cls(rms(size[known]), float(size[known].max()), over, float(1.0 - known.mean()))
 
     @property
     def exact(self) -> bool:
         """True if the firmware holds the robot."""
-        return self.worst <= EXACT
+        return self.worst <= EXACT and not self.lacking
 
     def __str__(self) -> str:
-        return f"off by {self.rms:.2g} mm rms, {self.worst:.2g} mm at most, {self.over}"
+        if self.lacking == 1.0:
+            return f"without any pose {self.over}"
+        size = f"off by {self.rms:.2g} mm rms, {self.worst:.2g} mm at most, {self.over}"
+        if not self.lacking:
+            return size
+        share = max(100.0 * self.lacking, 1.0)
+        return f"{size}, and without a pose at {share:.0f} % of the places there"
 
 
 def cylinder(across: float, high: float, count: int) -> FloatArray:
@@ -60,22 +78,16 @@ def off_by(model: Robot, q: FloatArray, poses: FloatArray) -> FloatArray:
 
 
 def loss(model: Robot, q: FloatArray, poses: FloatArray, over: str) -> Loss:
-    """Return how far a model is from poses; infinite where it has none."""
-    off = np.nan_to_num(np.linalg.norm(off_by(model, q, poses), axis=1), nan=np.inf)
-    return Loss(rms(off), float(off.max()), over)
+    """Return how far a model is from poses."""
+    return Loss.of(off_by(model, q, poses), over)
 
 
 def sag(robot: Robot) -> Loss:
-    """Return how far a machine that yields is from the rigid one; infinite where it gives way."""
+    """Return how far a machine that yields is from the rigid one, where it does not give way."""
     rigid = robot.rigid
     poses, q, _ = rigid.commanded(sample_poses(rigid, _SAGS, share=0.5))
     off = robot.forward(q, guess=poses).pose[:, :3] - poses[:, :3]
-    size = np.nan_to_num(np.linalg.norm(off, axis=1), nan=np.inf)
-    return Loss(
-        rms(size),
-        float(size.max()),
-        "by what yields under the stated load, over half of its workspace",
-    )
+    return Loss.of(off, "by what yields under the stated load, over half of its workspace")
 
 
 def laws(arm: SerialArm) -> Loss:
@@ -87,8 +99,7 @@ def laws(arm: SerialArm) -> Loss:
     high = np.where(np.isfinite(limits[:, 1]), limits[:, 1], most)
     theta = low + (high - low) * np.random.default_rng(0).random((_SAGS, arm.n_joints))
     off = (arm.forward(theta) - arm.rigid.forward(theta))[:, :3, 3]
-    size = np.linalg.norm(off, axis=1)
-    return Loss(rms(size), float(size.max()), "by what its joints add to their commands")
+    return Loss.of(off, "by what its joints add to their commands")
 
 
 def require_plain(arm: SerialArm, format: str) -> None:

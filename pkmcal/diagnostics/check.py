@@ -50,6 +50,9 @@ class Remedy:
     {'drop': (3, 'outliers'), 'holdout': 0.2}
     >>> Remedy("loss", "cauchy").applied({"loss": ("huber", "cluster")})
     {'loss': ('cluster', 'cauchy')}
+    >>> import pkmcal as pk
+    >>> Remedy("effects", (pk.Sag("all"),)).applied({"effects": [pk.Coupling([(6, 5)]), pk.Sag()]})
+    {'effects': (Coupling(pairs=[(6, 5)], ratio=0.001), Sag('all'))}
     >>> Remedy("unknown", "target").applied({"unknown": {"frame": "known", "target": "known"}})
     {'unknown': {'frame': 'known', 'target': 'unknown'}}
     """
@@ -78,7 +81,10 @@ class Remedy:
         return {**arguments, self.argument: value}
 
     def _replaces(self, word: object) -> bool:
-        """Return whether a word that the argument has is another loss: there is only one."""
+        """Return whether it is another loss, or an effect of the same name: there is only one."""
+        if self.argument == "effects":
+            names = {each.name for each in self.value}
+            return word == "auto" or getattr(word, "name", None) in names
         return self.argument == "loss" and {self.value, word} <= LIMITS.keys()
 
     @property
@@ -108,7 +114,7 @@ class Remedy:
 
 
 def _listed(value: Any) -> tuple[Any, ...]:
-    return (value,) if isinstance(value, str) else tuple(value)
+    return tuple(value) if isinstance(value, Iterable) and not isinstance(value, str) else (value,)
 
 
 @dataclass(frozen=True)

@@ -34,19 +34,19 @@ CHECKS = (
     ),
     Check(
         name="measuring-order", about="residuals follow the order of measuring",
-        unless=("grave", "drift"), levels=("doubt", "remark"),
+        unless=("grave", "drift", "follows-loads"), levels=("doubt", "remark"),
         run=lambda found: at_most_one(measuring_order(found.fit, found.outliers)), level_of=_level,
         say=lambda found, seen: str(seen),
     ),
     Check(
         name="late-readings", about="residuals follow the way from the pose before, or to the next",
-        unless=("grave",), run=lambda found: at_most_one(late(found)),
+        unless=("grave", "follows-loads"), run=lambda found: at_most_one(late(found)),
         level_of=lambda found, seen: "doubt" if seen.found else None,
         say=lambda found, seen: str(seen),
     ),
     Check(
         name="two-machines", about="sets, sessions, halves or other rows want other numbers",
-        unless=("grave", "copies", "displaced-target"), levels=("doubt", "remark"),
+        unless=("grave", "copies", "displaced-target", "follows-loads"), levels=("doubt", "remark"),
         run=lambda found: at_most_one(apart(found)),
         level_of=lambda found, seen: _level(found, seen) if seen.found else None,
         say=lambda found, seen: str(seen),

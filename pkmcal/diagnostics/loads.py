@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from contextlib import suppress
 from typing import NamedTuple
 
 import numpy as np
 
 from pkmcal.arrays import FloatArray
-from pkmcal.diagnostics.check import Check, Level, Remedy, at_most_one
+from pkmcal.diagnostics.check import Check, Remedy, at_most_one
 from pkmcal.diagnostics.columns import of_rows
 from pkmcal.display import chance_text
 from pkmcal.effects.elasticity import Elasticity
@@ -17,41 +16,47 @@ from pkmcal.exceptions import ArgumentError
 from pkmcal.fitted.fit import Fit
 from pkmcal.fitted.solution import Solution
 from pkmcal.geometry.carried import Load
-from pkmcal.geometry.elastic import COMPLIANCE
+from pkmcal.geometry.elastic import COMPLIANCE, PER_LENGTH
 from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.readings.predicted import Predicted
+from pkmcal.statistics.distributions import t_tail
 from pkmcal.statistics.score_test import Columns, score_test
 
-CHANCE = 0.01  # below which residuals follow the loads
+CHANCE = 0.01  # below which residuals follow the loads, and a compliance is below 0
 _UNSURE = 0.2  # share of a compliance that its standard deviation exceeds where loads are alike
 _OF_LEGS, _OF_JOINTS = Elasticity("offset*"), Elasticity("joint*")
 
 
-class IgnoredLoads(NamedTuple):
-    """Loads of rows of a machine of which nothing yields.
+class FollowedLoads(NamedTuple):
+    """Loads of rows that the residuals of a machine follow of which nothing yields.
 
     Attributes
     ----------
     chance : float
-        Of residuals that follow the loads as much by accident; NaN where that cannot be tested.
+        Of residuals that follow the loads as much by accident.
     """
 
     chance: float
 
 
-def _ignored(found: Solution) -> tuple[IgnoredLoads, ...]:
-    fit, robot = found.fit, found.fit.parameters.robot
-    if robot.yields:
+def _ignored(found: Solution) -> bool:
+    """Return whether rows state loads, and nothing of the machine yields."""
+    fit = found.fit
+    loads = [m.load for m in fit.equations.table.sets]
+    return not fit.parameters.robot.yields and any(
+        load is not None and bool(load.any()) for load in loads
+    )
+
+
+def _followed(found: Solution) -> tuple[FollowedLoads, ...]:
+    fit, sure = found.fit, found.fit.uncertainty
+    if not _ignored(found) or sure.mixed or sure.rounded:
         return ()
-    if not any(m.load is not None and m.load.any() for m in fit.equations.table.sets):
-        return ()
-    sure = fit.uncertainty
-    if sure.mixed or sure.rounded:
-        return (IgnoredLoads(float("nan")),)
     with suppress(ArgumentError):  # limbs without such numbers, or with shared forces
-        score = score_test(sure.fit, _by_compliances(fit, robot))
-        return (IgnoredLoads(float("nan") if score is None else score.chance),)
-    return (IgnoredLoads(float("nan")),)
+        score = score_test(sure.fit, _by_compliances(fit, fit.parameters.robot))
+        if score is not None and score.chance < CHANCE:
+            return (FollowedLoads(score.chance),)
+    return ()
 
 
 def _of_loads(robot: Calibratable) -> Elasticity:
@@ -75,29 +80,38 @@ def _by_compliances(fit: Fit, robot: Calibratable) -> Columns:
     return of_rows(fit, change)
 
 
-def _ignored_level(found: Solution, seen: IgnoredLoads) -> Level:
-    return "doubt" if seen.chance < CHANCE else "remark"
-
-
-def _ignored_text(found: Solution, seen: IgnoredLoads) -> str:
+def _carried(found: Solution) -> str:
+    """The loads of the rows, in words."""
     masses = np.hstack([m.load[:, 0] for m in found.fit.equations.table.sets if m.load is not None])
     least, most = masses.min(), masses.max()
-    carried = "loads of the rows" if not most else f"loads of the rows, {least:g} to {most:g} kg,"
-    if seen.chance < CHANCE:
-        numbers = _of_loads(found.fit.parameters.robot).numbers
-        return (
-            f"residuals follow the {carried} ({chance_text(seen.chance)}): the machine yields; find"
-            f" its compliances, --effects 'elasticity={numbers}' (effects=[pk.Elasticity"
-            f"('{numbers}')])"
-        )
-    return f"the {carried} are not taken into account: nothing of the machine yields"
+    return "loads of the rows" if not most else f"loads of the rows, {least:g} to {most:g} kg,"
 
 
-def _compliances(found: Solution) -> Iterator[tuple[str, float, float]]:
-    """Estimated compliances of limbs and joints: names, values, deviations."""
-    for name, value, sigma in zip(found.free, found.values, found.stderr, strict=True):
-        if name.startswith(COMPLIANCE.removesuffix(".")):
-            yield name, float(value), float(sigma)
+def _followed_text(found: Solution, seen: FollowedLoads) -> str:
+    numbers = _of_loads(found.fit.parameters.robot).numbers
+    return (
+        f"residuals follow the {_carried(found)} ({chance_text(seen.chance)}): the machine yields;"
+        f" find its compliances, --effects 'elasticity={numbers}' (effects=[pk.Elasticity"
+        f"('{numbers}')])"
+    )
+
+
+class _Compliance(NamedTuple):
+    name: str
+    value: float
+    sigma: float
+    freedom: float
+
+
+def _compliances(found: Solution) -> list[_Compliance]:
+    """Estimated compliances of limbs and joints; those that are determined, where any is."""
+    of_each = zip(found.free, found.values, found.stderr, found.parameter_dof, strict=True)
+    every = [
+        _Compliance(name, *map(float, numbers))
+        for name, *numbers in of_each
+        if name.startswith(COMPLIANCE.removesuffix(".")) and not name.endswith(PER_LENGTH)
+    ]
+    return [each for each in every if np.isfinite(each.sigma)] or every
 
 
 def _alike(found: Solution) -> tuple[float, ...]:
@@ -105,30 +119,45 @@ def _alike(found: Solution) -> tuple[float, ...]:
     loads = [m.load for m in found.fit.equations.table.sets]
     stated = np.vstack([each for each in loads if each is not None] or [np.zeros((1, 10))])
     alike = all(each is None for each in loads) or all(each is not None for each in loads)
-    unsure = [sigma / abs(value) for _, value, sigma in _compliances(found) if value]
+    unsure = [each.sigma / abs(each.value) for each in _compliances(found) if each.value]
     if not unsure or not alike or (stated != stated[0]).any():
         return ()
     return (max(unsure),) if max(unsure) > _UNSURE else ()
 
 
-def _negative(found: Solution) -> tuple[tuple[str, float, float], ...]:
-    """The compliance that is most clearly below 0."""
-    below = [each for each in _compliances(found) if each[1] < -2.0 * each[2]]
-    return at_most_one(min(below, key=lambda each: each[1] / each[2]) if below else None)
+def _negative(found: Solution) -> tuple[_Compliance, ...]:
+    """The compliance that is most clearly below 0, if none at 0 would be so by chance."""
+    known = [each for each in _compliances(found) if 0.0 < each.sigma < np.inf]
+    below = [
+        (0.5 * t_tail(each.value / each.sigma, each.freedom), each)
+        for each in known
+        if each.value < 0.0
+    ]
+    chance, least = min(below, key=lambda each: each[0]) if below else (1.0, None)
+    return at_most_one(least if len(known) * chance < CHANCE else None)
 
 
 CHECKS = (
     Check(
-        name="ignored-loads", about="rows state loads, and nothing of the machine yields",
-        levels=("doubt", "remark"), run=_ignored, level_of=_ignored_level, say=_ignored_text,
+        name="follows-loads", about="residuals follow the loads of rows of a rigid machine",
+        run=_followed, say=_followed_text,
         remedies=lambda found, seen: (Remedy("effects", (_of_loads(found.fit.parameters.robot),)),),
+    ),
+    Check(
+        name="ignored-loads", about="rows state loads, and nothing of the machine yields",
+        levels=("remark",), unless=("follows-loads",),
+        run=lambda found: (None,) if _ignored(found) else (),
+        say=lambda found, _: (
+            f"the {_carried(found)} are not taken into account: nothing of the machine yields"
+        ),
     ),
     Check(
         name="negative-compliance", about="a compliance is below 0, as of no spring",
         run=_negative,
         say=lambda found, seen: (
-            f"{seen[0]} is {seen[1]:.3g} ± {seen[2]:.2g}, below 0: something else than a spring"
-            " moves with the loads, the controller corrects sag itself, or a load has a wrong sign"
+            f"{seen.name} is {seen.value:.3g} ± {seen.sigma:.2g}, below 0: something else than a"
+            " spring moves with the loads, the controller corrects sag itself, or the sign of a"
+            " load is wrong"
         ),
     ),
     Check(

@@ -14,7 +14,6 @@ from pkmcal.exceptions import ArgumentError
 from pkmcal.fitted.fit import Fit
 from pkmcal.fitted.left_out import Comparison, compared_by_poses, effect_columns
 from pkmcal.fitted.solution import Solution
-from pkmcal.kinematics.arm_machine import ArmMachine
 from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.statistics.causes import causes
 from pkmcal.statistics.score_test import Columns
@@ -38,7 +37,7 @@ class SagFinding(NamedTuple):
 
 
 class LackingSag(NamedTuple):
-    """Sag that a fit lacks, what it does to the numbers, and what looks like it.
+    """Sag that a fit lacks, and what looks like it.
 
     Attributes
     ----------
@@ -46,8 +45,6 @@ class LackingSag(NamedTuple):
         What would help.
     comparison : Comparison
         The poses left out.
-    shift : float
-        How far it moves the numbers, in their ±, rms.
     wave : Harmonics or None
         A wave a turn of one joint beside which sag explains nothing: an eccentric encoder makes the
         wave that the weight of the joint's own link does.
@@ -55,30 +52,30 @@ class LackingSag(NamedTuple):
 
     effect: Sag
     comparison: Comparison
-    shift: float
     wave: Harmonics | None
 
 
 def sag_that_helps(fit: Fit) -> SagFinding | None:
     """The sag of an arm that a fit lacks and that helps at poses left out; None where none does.
 
-    First that of the main joints against none, then that of all joints against it.
+    First that of the main joints against what was fitted, then that of all joints against the
+    better of both: main joints that explain nothing alone may do so with the others.
     """
     machine = fit.parameters.robot
-    if not isinstance(machine, ArmMachine) or _of_sag(fit):
+    if machine.kind != "arm":
         return None
-    found, before = None, frozenset[str]()
+    found, before = None, {*fit.parameters.names}
     for effect in (Sag("main"), Sag("all")):
         changed = _on(effect, machine)
-        if changed is None:
-            break
-        gained = compared_by_poses(fit, [changed], {*changed.free} - before)
+        lacking = set() if changed is None else {*changed.free} - before
+        if changed is None or not lacking:
+            continue
+        gained = compared_by_poses(fit, [changed], lacking)
         if gained is None or not gained.passes:
-            break
-        against_none = gained if not before else compared_by_poses(fit, [changed])
-        if against_none is None:
-            break
-        found, before = SagFinding(effect, against_none), frozenset(changed.free)
+            continue
+        against_fit = gained if found is None else compared_by_poses(fit, [changed])
+        if against_fit is not None:
+            found, before = SagFinding(effect, against_fit), before | lacking
     return found
 
 
@@ -101,15 +98,13 @@ def _of_sag(fit: Fit) -> list[str]:
 
 
 def _lacking(found: Solution) -> tuple[LackingSag, ...]:
-    """Return the gain by sag that the fit lacks, and how far it moves the numbers, in their ±."""
+    """Return the gain by sag that the fit lacks, and the wave that looks like it."""
     helps = sag_that_helps(found.fit)
     if helps is None:
         return ()
     machine = found.fit.parameters.robot
     columns = effect_columns(found.fit, [helps.effect.of_machine(machine)])
-    seen = [] if columns is None else causes(found.fit.uncertainty.fit, [columns], SURE, 1)
-    shift = seen[0].shift if seen else 0.0
-    return (LackingSag(*helps, shift, None if columns is None else _alike(found.fit, columns)),)
+    return (LackingSag(*helps, None if columns is None else _alike(found.fit, columns)),)
 
 
 def _alike(fit: Fit, sag: Columns) -> Harmonics | None:
@@ -119,7 +114,9 @@ def _alike(fit: Fit, sag: Columns) -> Harmonics | None:
         (each, effect_columns(fit, [each.of_machine(machine)])) for each in waves_a_turn(machine)
     ]
     there = [(each, columns) for each, columns in by_wave if columns is not None]
-    (best, *_) = causes(fit.uncertainty.fit, [sag, *(own for _, own in there)], SURE, 1) or (None,)
+    (best, *_) = causes(fit.uncertainty.tested, [sag, *(own for _, own in there)], SURE, 1) or (
+        None,
+    )
     if best is None or best.cause == 0 or 0 not in best.also:
         return None
     return there[best.cause - 1][0]
@@ -138,9 +135,7 @@ def _figures(gained: Comparison) -> str:
 def _say_lacking(found: Solution, lacking: LackingSag) -> str:
     gained, wave = lacking.comparison, lacking.wave
     joints = sorted({name.partition(".")[0].removeprefix("sag") for name in gained.numbers})
-    harm = (
-        f", and the numbers move by {lacking.shift:.2g} of their ±" if lacking.shift > 0.5 else ""
-    )
+    harm = f", and the numbers move by {gained.shift:.2g} of their ±" if gained.shift > 0.5 else ""
     also = (
         f", or as well a wave a turn of joint {wave.joints}, as of an eccentric encoder or a tilted"
         f" axis, with {Remedy('effects', (wave,))}"
@@ -165,7 +160,9 @@ CHECKS = (
     Check(
         name="sag-lacking", about="joints of an arm yield under its weight, and nothing says so",
         levels=("doubt", "remark"),
-        level_of=lambda found, finding: "doubt" if finding.shift > HARMFUL else "remark",
+        level_of=lambda found, lacking: (
+            "doubt" if lacking.comparison.shift > HARMFUL else "remark"
+        ),
         run=_lacking, say=_say_lacking,
         remedies=lambda found, finding: (Remedy("effects", (finding.effect,)),),
     ),

@@ -96,7 +96,8 @@ def _level(found: Solution, seen: Sides) -> Level | None:
 CHECKS = (
     Check(
         name="sides", about="the two sides of the workspace want other numbers",
-        unless=("grave", "copies", "two-machines", "displaced-target"), levels=("doubt", "remark"),
+        unless=("grave", "copies", "two-machines", "displaced-target", "follows-loads"),
+        levels=("doubt", "remark"),
         run=lambda found: at_most_one(sides(found)), level_of=_level,
         say=lambda found, seen: str(seen),
     ),

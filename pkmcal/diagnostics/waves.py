@@ -183,6 +183,7 @@ CHECKS = (
     Check(
         name="waves", about="waves of gears that residuals of an arm follow",
         levels=("remark",),
+        unless=("sag-lacking",),
         run=_run,
         say=_say,
         remedies=lambda found, wave: (

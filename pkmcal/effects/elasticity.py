@@ -37,8 +37,8 @@ class Elasticity:
     Parameters
     ----------
     numbers : str or sequence of str
-        Names or wildcards: ``"offset*"`` of legs and screws, ``"rod*"``, ``"base*"`` of bearings;
-        of an arm ``"joint*"``, ``"joint2"``.
+        Names or wildcards: ``"offset*"`` of legs and screws, ``"rod*"``, ``"base*"`` of bearings,
+        a parameter that several limbs follow; of an arm ``"joint*"``, ``"joint2"``.
     per_length : bool
         Whether compliances of legs and screws also grow along their way, mm/N per mm:
         ``compliance.offset1.per_length``.

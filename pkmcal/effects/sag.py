@@ -10,14 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import Literal
 
 import numpy as np
 
 from pkmcal.arguments import instance, number
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arms.joint_laws import Term, sag_term
-from pkmcal.arms.weights import gravity_torques
+from pkmcal.arms.joint_pulls import JointPulls
 from pkmcal.arrays import FloatArray
 from pkmcal.effects.effect import Changed
 from pkmcal.exceptions import ArgumentError
@@ -55,7 +55,11 @@ class Sag:
     joints: Joints = "main"
     tied: bool = False
     turns: float = TURNS
-    name: ClassVar[str] = "sag"
+
+    @property
+    def name(self) -> str:
+        """As messages say it; products and compliances may be found together."""
+        return "tied sag" if self.tied else "sag"
 
     def __repr__(self) -> str:
         stated = [] if self.joints == "main" else [repr(self.joints)]
@@ -90,7 +94,7 @@ class Sag:
         products = _products(arm)
         joints = self._chosen(arm, products)
         if self.tied:
-            return _tied(arm, joints, turns)
+            return Changed(self.name, *_tied(arm, joints, turns))
         terms = _independent(products, joints)
         own = dict.fromkeys((term.name for term in terms), turns)
         return Changed(self.name, ArmMachine(arm.with_terms(terms)), own)
@@ -124,15 +128,6 @@ def _postures(arm: SerialArm) -> FloatArray:
     return np.random.default_rng(0).uniform(-1.0, 1.0, (_POSTURES, arm.n_joints)) * spread
 
 
-def _bare(arm: SerialArm) -> SerialArm:
-    """The arm whose products of gravity its laws take."""
-    return arm.rigid.replace(np.zeros((arm.n_joints, 6)))
-
-
-def _gravity(arm: SerialArm) -> FloatArray:
-    return np.array(arm.joint_laws.pulls.gravity)
-
-
 def _products(arm: SerialArm) -> FloatArray:
     """Return `gravity_products` in all postures, (_POSTURES, n, n, 3)."""
     laws, n = arm.joint_laws, arm.n_joints
@@ -146,9 +141,14 @@ def _products(arm: SerialArm) -> FloatArray:
 def _levers(arm: SerialArm) -> FloatArray:
     """Rms torque about each joint (n,) if all links weighed alike, half way to the next joint."""
     ends = np.vstack([arm.points[1:], arm.home[None, :3, 3]])
-    torques = gravity_torques(
-        _bare(arm), _postures(arm), np.ones(arm.n_joints), (arm.points + ends) / 2, _gravity(arm)
-    )
+    return _rms_torques(arm, np.ones(arm.n_joints), (arm.points + ends) / 2)
+
+
+def _rms_torques(arm: SerialArm, masses: FloatArray, centres: FloatArray) -> FloatArray:
+    """Rms torque of links with these masses (n,) and centres (n, 3) about each joint, (n,)."""
+    laws, postures = arm.joint_laws, _postures(arm)
+    weights = JointPulls(arm.axes, arm.points, arm.kinds, laws.pulls.gravity, masses, centres)
+    torques = weights.torques(laws.posture(postures), postures)
     rms: FloatArray = np.sqrt(np.mean(torques**2, axis=0))
     return rms
 
@@ -172,8 +172,10 @@ def _independent(products: FloatArray, joints: Sequence[int]) -> list[Term]:
     return found
 
 
-def _tied(arm: SerialArm, joints: Sequence[int], turns: float) -> Changed:
-    """The arm with a compliance of each of these joints."""
+def _tied(
+    arm: SerialArm, joints: Sequence[int], turns: float
+) -> tuple[ArmMachine, dict[str, float]]:
+    """The arm with a compliance of each of these joints, and the deviations of their priors."""
     arm = arm.weighed()
     pulls = arm.joint_laws.pulls
     assert pulls.masses is not None and pulls.centres is not None
@@ -182,15 +184,10 @@ def _tied(arm: SerialArm, joints: Sequence[int], turns: float) -> Changed:
             "sag: tied needs masses: keys mass and centre of the joints in the arm's file, or"
             " inertials in its URDF"
         )
-    torques = gravity_torques(
-        _bare(arm), _postures(arm), pulls.masses, pulls.centres, _gravity(arm)
-    )
-    size = np.sqrt(np.mean(torques**2, axis=0))
+    size = _rms_torques(arm, pulls.masses, pulls.centres)
     own = {}
     for i in joints:
         if not size[i] > 0.0:
             raise ArgumentError(f"sag: the links behind joint {i + 1} weigh nothing")
         own[Term(i, "compliance")] = turns / float(size[i])
-    return Changed(
-        "sag", ArmMachine(arm.with_terms(own)), {term.name: each for term, each in own.items()}
-    )
+    return ArmMachine(arm.with_terms(own)), {term.name: each for term, each in own.items()}

@@ -65,13 +65,19 @@ Decomposed = tuple[FloatArray, FloatArray]  # singular values (n,), directions (
 def decompose(*jacobian: FloatArray) -> Decomposed:
     """Singular values (n,), zeros where there are fewer rows, and all directions (n, n).
 
-    The Jacobian may be in parts, below each other.
+    The Jacobian may be in parts, below each other. What nothing reads is a direction of its own,
+    the last: others have no part of it, not even by rounding.
     """
     n = jacobian[0].shape[1]
     factor = few_rows(*jacobian)
-    whole = np.zeros((max(n, len(factor)), n))
-    whole[: len(factor)] = factor
-    _, singular, rows = svd(whole)
+    read = factor.any(axis=0)
+    count = int(np.count_nonzero(read))
+    whole = np.zeros((max(count, len(factor)), count))
+    whole[: len(factor)] = factor[:, read]
+    singular, rows = np.zeros(n), np.zeros((n, n))
+    if count:
+        _, singular[:count], rows[:count, read] = svd(whole)
+    rows[count:, ~read] = np.eye(n - count)
     return singular, rows.T
 
 

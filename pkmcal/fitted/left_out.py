@@ -18,13 +18,14 @@ from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.free_parameters import parameters
 from pkmcal.estimation.parameters import Parameters
 from pkmcal.fitted.fit import Fit
-from pkmcal.statistics.leave_out import leave_out
+from pkmcal.statistics.leave_out import LeftOut, leave_out
 from pkmcal.statistics.linear_fit import numbered
 from pkmcal.statistics.score_test import Columns, columns_of
 
 LEAST_GAIN = 0.05  # share of the rms at poses left out that an effect must take away
 LEAST_T = 2.0  # of the paired differences by pose
 LEAST_POSES = 8
+_INVOLVED = 1e-6  # share of a number in combinations that are not determined
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,8 @@ class Comparison:
         controller makes of them that does not hold it.
     t : float
         Mean of the paired differences of squares by pose, over its standard deviation.
+    shift : float
+        How far the other numbers of the fit move by the effect, in their ±, rms.
     """
 
     numbers: tuple[str, ...]
@@ -52,6 +55,7 @@ class Comparison:
     after: float
     alone: float
     t: float
+    shift: float
 
     @property
     def passes(self) -> bool:
@@ -115,7 +119,7 @@ def compared_by_poses(
     added = (whole.without[pose][:, beside] * jacobian[:, beside]).sum(axis=1) + undone
     missed = plain.missed, whole.missed, whole.missed + added
     lengths = [_squares(fit, each, pose) for each in missed]
-    return _comparison(lengths, beside, chosen, fit)
+    return _comparison(lengths, beside, chosen, fit, _shift(fit, chosen, plain, whole, ~beside))
 
 
 def effect_columns(fit: Fit, effects: Sequence[Effect | Changed]) -> Columns | None:
@@ -141,8 +145,22 @@ def _squares(fit: Fit, missed: FloatArray, pose: np.ndarray) -> FloatArray:
     return np.bincount(pose, off**2).astype(np.float64)
 
 
+def _shift(fit: Fit, chosen: Parameters, plain: LeftOut, whole: LeftOut, kept: BoolArray) -> float:
+    """Return by how many of their ± numbers that the fit determines move with the effect, rms."""
+    place = {name: i for i, name in enumerate(fit.parameters.names)}
+    moved = np.zeros(len(place))
+    change = whole.found[kept] - plain.found
+    for name, by in zip(np.array(chosen.names)[kept].tolist(), change.tolist(), strict=True):
+        if name in place:
+            moved[place[name]] = by
+    determined = np.linalg.norm(np.linalg.qr(fit.uncertainty.fit.back)[0], axis=1)
+    deviation = np.sqrt(np.maximum(np.diag(fit.uncertainty.scaled), 0.0))
+    known = np.isfinite(deviation) & (deviation > 0.0) & (determined > 1.0 - _INVOLVED)
+    return float(np.sqrt(np.mean((moved[known] / deviation[known]) ** 2))) if known.any() else 0.0
+
+
 def _comparison(
-    squares: Sequence[FloatArray], beside: BoolArray, chosen: Parameters, fit: Fit
+    squares: Sequence[FloatArray], beside: BoolArray, chosen: Parameters, fit: Fit, shift: float
 ) -> Comparison | None:
     plain, whole, bare = squares
     good = np.isfinite(plain) & np.isfinite(whole)
@@ -161,6 +179,7 @@ def _comparison(
         after=float(np.sqrt(whole[good].sum() / points)),
         alone=float(np.sqrt(bare[good].sum() / points)),
         t=float(gain.mean()) / spread if spread > 0.0 else 0.0,
+        shift=shift,
     )
 
 

@@ -6,20 +6,24 @@ values are numbers of the geometry themselves; this module says which there are 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 
 from pkmcal.arrays import Unit
+from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.load import is_of_load
+from pkmcal.geometry.ties import LimbNumber
 
 GRAVITY = (0.0, 0.0, -9.80665)  # m/s², in the axes of the base
 COMPLIANCE, PER_LENGTH = "compliance.", ".per_length"
+SOFTEST = 100.0  # mm/N, rad/(N mm): 1 kg moves the number by 1 m
 _GROUPS = ("compliance", "mass.", "centre.", "payload.", "gravity.", "balancer")
 
 
 @dataclass(frozen=True)
 class Spring:
-    """A number of a limb that yields.
+    """A number that yields: of a limb, or a parameter that several follow, such as of one screw.
 
     Attributes
     ----------
@@ -31,12 +35,25 @@ class Spring:
         The drive, counted from 0, by whose way the compliance grows; -1 where it is constant.
     at : float
         The way, mm, at which the compliance is the stated one.
+    followers : tuple of (str, float)
+        Numbers of limbs that follow a parameter, with +1 or -1; none of a number of a limb.
     """
 
     number: str
     unit: Unit
     drive: int = -1
     at: float = 0.0
+    followers: tuple[tuple[str, float], ...] = ()
+
+    @property
+    def moves(self) -> tuple[tuple[str, float], ...]:
+        """Numbers of limbs that it moves, and by how much as it yields by 1."""
+        return self.followers or ((self.number, 1.0),)
+
+    @property
+    def of_drive(self) -> bool:
+        """True if it is that of one leg, screw or crank."""
+        return self.number.startswith("offset") and not self.followers
 
     @property
     def units(self) -> dict[str, Unit]:
@@ -44,6 +61,24 @@ class Spring:
         own: Unit = "rad/(N mm)" if self.unit == "rad" else "mm/N"
         found = {COMPLIANCE + self.number: own}
         return found if self.drive < 0 else found | {COMPLIANCE + self.number + PER_LENGTH: "1/N"}
+
+
+def spring_of(name: str, unit: Unit, numbers: Sequence[LimbNumber]) -> Spring:
+    """The spring of a number of a limb, or of a parameter and the numbers that follow it.
+
+    Raises
+    ------
+    ValueError
+        What is no length and no angle, or a parameter that numbers follow otherwise than alike.
+    """
+    if unit not in ("mm", "rad"):
+        raise ArgumentError(f"{name} is no length and no angle, and does not yield")
+    if any(number.name == name for number in numbers):
+        return Spring(name, unit)
+    ties = [(each.name, each.tie) for each in numbers if each.tie and name in each.tie.drivers]
+    if bent := [each for each, tie in ties if tie.rule != "equal"]:
+        raise ArgumentError(f"{name} is a radius or an angle of {bent[0]}: name that number")
+    return Spring(name, unit, followers=tuple((each, tie.terms[0].factor) for each, tie in ties))
 
 
 @dataclass(frozen=True)
@@ -99,6 +134,27 @@ class Elastic:
 
 def _point(name: str, unit: Unit) -> dict[str, Unit]:
     return {f"{name}.{axis}": unit for axis in "xyz"}
+
+
+def require_compliance(what: str, value: float, stiffness: str, per_stiffness: float = 1.0) -> None:
+    """Refuse a compliance that no machine has, such as a stiffness in its place.
+
+    Parameters
+    ----------
+    what : str
+        As messages say it.
+    value : float
+        The compliance, mm/N or rad/(N mm).
+    stiffness : str
+        The unit of the stiffness that it may be.
+    per_stiffness : float
+        The compliance of a stiffness of 1.
+    """
+    if value > SOFTEST:
+        raise ArgumentError(
+            f"{what} is {value:g}, softer than any machine: if that is a stiffness in {stiffness},"
+            f" its compliance is {per_stiffness / value:.4g}"
+        )
 
 
 @cache

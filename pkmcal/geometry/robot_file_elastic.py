@@ -7,6 +7,7 @@ and moments in N mm, whatever the file's units; places and angles are in its uni
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from fnmatch import fnmatchcase
 from typing import Any, NamedTuple
 
@@ -15,8 +16,9 @@ import numpy as np
 from pkmcal.arguments import did_you_mean
 from pkmcal.arrays import Unit
 from pkmcal.core.library import SLOTS
+from pkmcal.exceptions import ArgumentError
 from pkmcal.files.toml_table import Table, shown
-from pkmcal.geometry.elastic import COMPLIANCE, GRAVITY, PER_LENGTH, Elastic, Spring
+from pkmcal.geometry.elastic import COMPLIANCE, GRAVITY, PER_LENGTH, Elastic, Spring, spring_of
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.robot_file_limbs import Entry, Limbs, Parameters
 from pkmcal.geometry.ties import LimbNumber
@@ -55,7 +57,7 @@ def read_elastic(
         return None, limbs
     _refuse_cables(top, limbs)
     order = {number.name: _place(limbs, number) for number in limbs.numbers}
-    springs = sorted(yielding.values(), key=lambda each: order[each.spring.number])
+    springs = sorted(yielding.values(), key=lambda each: order[each.spring.moves[0][0]])
     numbers = _Numbers(parameters)
     for each in springs:
         name = COMPLIANCE + each.spring.number
@@ -94,7 +96,8 @@ def _of_limbs(
     for i, table in enumerate(described):
         for key, slot in STIFFNESS.items():
             if key in table:
-                yield _by_stiffness(table, key, _spring(limbs, f"{slot}{i + 1}"), parameters)
+                number = next(each for each in limbs.numbers if each.name == f"{slot}{i + 1}")
+                yield _by_stiffness(table, key, Spring(number.name, number.unit), parameters)
 
 
 def _by_stiffness(table: Table, key: str, spring: Spring, parameters: Parameters) -> _Yields:
@@ -119,15 +122,20 @@ def _of_table(top: Table, limbs: Limbs, parameters: Parameters) -> Iterator[tupl
     if "compliance" not in top:
         return
     table = top.table("compliance")
-    names = [number.name for number in limbs.numbers]
+    units = {number.name: number.unit for number in limbs.numbers}
+    tied = dict.fromkeys(name for each in limbs.numbers if each.tie for name in each.tie.drivers)
+    of_parameters = {name: parameters.units[name] for name in tied}
     for key, value in table.data.items():
-        hits = [name for name in names if fnmatchcase(name, key)]
+        hits = [name for name in units if fnmatchcase(name, key)]
+        hits = hits or [name for name in of_parameters if fnmatchcase(name, key)]
         if not hits:
-            table.fail("", f"the limbs have no number {key!r}{did_you_mean(key, names)}", at=key)
+            known = did_you_mean(key, [*units, *of_parameters])
+            table.fail("", f"the limbs have no number {key!r}{known}", at=key)
         for name in hits:
-            spring = _spring(limbs, name)
-            if spring.unit not in ("mm", "rad"):
-                table.fail("", f"{name} is no length and no angle, and does not yield", at=key)
+            try:
+                spring = spring_of(name, (units | of_parameters)[name], limbs.numbers)
+            except ArgumentError as error:
+                table.fail("", str(error), at=key)
             unit = spring.units[COMPLIANCE + name]
             of, at, per_length, given = table, key, None, value
             if isinstance(value, Mapping):
@@ -145,17 +153,12 @@ def _growing(of: Table, spring: Spring, parameters: Parameters) -> tuple[Spring,
         if "at" in of:
             of.fail("at", "is where per_length is 0, which is missing")
         return spring, None
-    if spring.unit != "mm" or not spring.number.startswith("offset"):
+    if spring.unit != "mm" or not spring.of_drive:
         of.fail("per_length", f"is of a leg or a screw, and {spring.number} has no way to grow by")
     term = parameters.term(of, "per_length", of["per_length"], "1/N")
     drive = int(spring.number.removeprefix("offset")) - 1
-    grown = Spring(spring.number, spring.unit, drive, of.number("at", "mm"))
+    grown = replace(spring, drive=drive, at=of.number("at", "mm"))
     return grown, parameters.entry(term)
-
-
-def _spring(limbs: Limbs, name: str) -> Spring:
-    number = next(number for number in limbs.numbers if number.name == name)
-    return Spring(name, number.unit)
 
 
 def _place(limbs: Limbs, number: LimbNumber) -> int:

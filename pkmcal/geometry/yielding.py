@@ -8,11 +8,18 @@ from dataclasses import replace
 import numpy as np
 
 from pkmcal.arguments import number
-from pkmcal.arrays import FloatArray, Unit
+from pkmcal.arrays import FloatArray
 from pkmcal.core.library import SLOTS
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.carried import CARRIED, Load
-from pkmcal.geometry.elastic import COMPLIANCE, Elastic, Spring, is_elastic
+from pkmcal.geometry.elastic import (
+    COMPLIANCE,
+    Elastic,
+    Spring,
+    is_elastic,
+    require_compliance,
+    spring_of,
+)
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.model import Model
 from pkmcal.geometry.ties import LimbNumber, Tie
@@ -59,8 +66,10 @@ def yielding(
     """
     wanted: dict[str, float] = {}
     for pattern, value in compliance.items():
-        number(f"compliance of {pattern}", value, least=0.0)
+        what = f"compliance of {pattern}"
+        number(what, value, least=0.0)
         wanted |= dict.fromkeys(elastic_numbers(model, pattern), float(value))
+        require_compliance(what, value, "N/mm or N mm/rad")
     if ways is not None:
         return _with_springs(model, wanted, ways)
     known = {name: value for name, value in wanted.items() if COMPLIANCE + name in model.geometry}
@@ -72,10 +81,15 @@ def yielding(
 
 
 def elastic_numbers(model: Model, pattern: str) -> list[str]:
-    """Numbers of limbs that match a name or wildcard, each a length or an angle."""
+    """Numbers of limbs that match a name or wildcard, each a length or an angle.
+
+    Parameters that limbs follow where no number of a limb does.
+    """
     rigid = model.rigid.geometry
-    units = {each.name: each.unit for each in rigid.numbers}
-    hits = [name for name in rigid.match(pattern, "compliance") if name in units]
+    units = dict(zip(rigid.names, rigid.units, strict=True))
+    matching = rigid.match(pattern, "compliance")
+    own = {each.name for each in rigid.numbers}
+    hits = [name for name in matching if name in own] or matching
     wrong = [name for name in hits if units[name] not in ("mm", "rad")]
     if wrong or not hits:
         what = wrong[0] if wrong else pattern
@@ -106,19 +120,21 @@ def _with_springs(
     place = dict(zip(rigid.names, rigid.slot_index.tolist(), strict=False))
     units = dict(zip(rigid.names, rigid.units, strict=True))
     of_number = {spring.number: spring for spring in before.springs}
-    of_number |= {name: _spring(name, units[name], ways) for name in fresh}
-    springs = sorted(of_number.values(), key=lambda spring: place[spring.number])
+    for name in fresh:
+        spring = spring_of(name, units[name], rigid.numbers)
+        of_number[name] = spring if ways is None else _growing(spring, ways)
+    springs = sorted(of_number.values(), key=lambda spring: place[spring.moves[0][0]])
     compliance = {COMPLIANCE + name: value for name, value in fresh.items()}
     return _with(model, replace(before, springs=tuple(springs)), compliance)
 
 
-def _spring(name: str, unit: Unit, ways: Sequence[float] | None) -> Spring:
-    if ways is None:
-        return Spring(name, unit)
-    if unit != "mm" or not name.startswith("offset"):
+def _growing(spring: Spring, ways: Sequence[float]) -> Spring:
+    """The spring with a compliance that grows from where its drive is at one of these ways."""
+    name = spring.number
+    if spring.unit != "mm" or not spring.of_drive:
         raise ArgumentError(f"per_length: of a leg or a screw, and {name} has no way to grow by")
     drive = int(name.removeprefix("offset")) - 1
-    return Spring(name, unit, drive, float(ways[drive]))
+    return replace(spring, drive=drive, at=float(ways[drive]))
 
 
 def _with(model: Model, elastic: Elastic, fresh: Mapping[str, float]) -> Model:

@@ -142,6 +142,10 @@ class Calibration(Stated):
         """
         if remedy.value is None or remedy.option is None:
             raise ArgumentError(f"{remedy.argument}: the remedy states no value; state it yourself")
+        if remedy.argument == "effects":
+            from pkmcal.jobs.effects_option import with_effects
+
+            return replace(self, effects=with_effects(self.effects, remedy.value))
         known = {f"--{each.name.replace('_', '-')}": each.name for each in fields(self)}
         words, changed = shlex.split(remedy.option), dict[str, Any]()
         while words:
@@ -151,7 +155,6 @@ class Calibration(Stated):
                 changed[name] = True
             elif isinstance(value, tuple):
                 kept = () if name == "free" else value
-                kept = tuple(each for each in kept if each not in ("none", "auto"))
                 changed[name] = tuple(dict.fromkeys((*(before or kept), words.pop(0))))
             else:
                 changed[name] = words.pop(0)

@@ -24,7 +24,7 @@ def read_effects(given: Sequence[str]) -> list[Any] | Literal["auto"]:
     ValueError
         An unknown word, or numbers that are none.
     """
-    words = [word.strip() for text in given for word in text.split(",")]
+    words = _words(given)
     if AUTO in words:
         if words != [AUTO]:
             raise ArgumentError(f"{OPTION}: auto stands alone")
@@ -34,6 +34,18 @@ def read_effects(given: Sequence[str]) -> list[Any] | Literal["auto"]:
             raise ArgumentError(f"{OPTION}: none stands alone")
         return []
     return [_effect(word) for word in words]
+
+
+def with_effects(given: Sequence[str], more: Sequence[Any]) -> tuple[str, ...]:
+    """Words of effects with more, which stand in for those of their names."""
+    names = {each.name for each in more}
+    stated = [word for word in _words(given) if word not in ("none", AUTO)]
+    kept = (word for word in stated if _effect(word).name not in names)
+    return (*kept, *(each.option for each in more))
+
+
+def _words(given: Sequence[str]) -> list[str]:
+    return [word.strip() for text in given for word in text.split(",")]
 
 
 def _effect(word: str) -> Any:

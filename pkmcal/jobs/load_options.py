@@ -10,13 +10,13 @@ from pkmcal.arms.arm import SerialArm
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.number_text import typed
 from pkmcal.geometry.carried import Load
+from pkmcal.geometry.elastic import require_compliance
 from pkmcal.geometry.yielding import elastic_numbers
 from pkmcal.jobs.rows import numbers_on_line
 from pkmcal.kinematics.robot import Robot
 
 Machine = TypeVar("Machine", Robot, SerialArm)
 _MASSES = {"": 1.0, "kg": 1.0, "g": 1e-3, "t": 1e3, "lb": 0.45359237}  # kg
-_SOFTEST = 1.0  # mm/N: 1 kg moves the number by 1 cm
 _MASS = re.compile(r"(.*?)\s*([a-z]*)")
 _TOOL = re.compile(r"[Tt]?(\d+)\s*=([^,]*)(?:,(.*))?", re.ASCII)
 
@@ -87,11 +87,7 @@ def _require_compliance(pattern: str, value: float) -> None:
         raise ArgumentError(
             f"--compliance {pattern} is 0: what does not yield is left out; found {value:g}"
         )
-    if value > _SOFTEST:
-        raise ArgumentError(
-            f"--compliance {pattern} is {value:g} mm/N or rad/(N mm), softer than any machine: if"
-            f" that is a stiffness in N/mm, its compliance is {1.0 / value:.4g}"
-        )
+    require_compliance(f"--compliance {pattern}", value, "N/mm or N mm/rad")
 
 
 def mass(option: str, text: str) -> float:

@@ -36,9 +36,11 @@ class LoadedMachine(RestingMachine):
         elastic = self.pulls.elastic
         if type(self.inner) is not Machine or elastic.balancers or elastic.anchors:
             return False
+        if self._moves is not None:
+            return False
         angles = any(spring.unit == "rad" for spring in elastic.springs)
         drivers = [DRIVERS[driver] for driver in self.struct.driver[0 : self.struct.limbs]]
-        offsets = all(spring.number.startswith("offset") for spring in elastic.springs)
+        offsets = all(spring.of_drive for spring in elastic.springs)
         legs = offsets and not angles and set(drivers) == {"length"}
         return legs or not elastic.rods  # halves of legs at base points do not move with offsets
 
@@ -115,7 +117,7 @@ class LoadedMachine(RestingMachine):
     ) -> None:
         """Go from rigid poses of some rows to where the numbers that yield stay; in place."""
         pose, status, iterations, residual = found
-        given = np.zeros((len(left), len(self._columns)))
+        given = np.zeros((len(left), len(self._compliance)))
         for _ in range(MOST_STEPS):
             if not len(left):
                 break
@@ -189,7 +191,9 @@ class LoadedMachine(RestingMachine):
         places: IntArray,
     ) -> FloatArray:
         """Twists (N, 6, k) by numbers of `Elastic` at places (k,)."""
-        twists = self.inner.error_jacobian(inside, pose, q, self._columns, twists=True)
+        twists = self._of_springs(
+            self.inner.error_jacobian(inside, pose, q, self._columns, twists=True)
+        )
         by_force = self.given_by_numbers(slots, pose, q, inside, places)
         return np.asarray(np.einsum("nis,nsk->nik", twists, by_force))
 
@@ -214,8 +218,8 @@ class LoadedMachine(RestingMachine):
         if len(others):
             places = (column[others] - self._width).astype(np.intp)
             given = self.given_by_numbers(slots, pose, q, inside, places)
-            by_spring = by_number[..., np.searchsorted(asked, self._columns)]
-            out[..., others] = by_spring @ given
+            by_column = by_number[..., np.searchsorted(asked, self._columns)]
+            out[..., others] = self._of_springs(by_column) @ given
         return residual, by_step, out
 
     @property

@@ -74,7 +74,12 @@ def _loaded(model: Model, inner: CompiledMachine, slots: FloatArray) -> LoadedMa
     if chains is not None and (chains.layout.shared or chains.layout.loose or chains.tail):
         raise ArgumentError(f"{lead}, which chains that share joints or carry a tail cannot have")
     pulls = Pulls(model.elastic, model.base_frame, model.tool_frame)
-    names = list(model.geometry.names)
-    places = [names.index(spring.number) for spring in model.elastic.springs]
+    place = dict(zip(model.geometry.names, model.geometry.slot_index.tolist(), strict=False))
+    springs = model.elastic.springs
+    places = sorted({place[name] for spring in springs for name, _ in spring.moves})
+    moves = np.zeros((len(springs), len(places)))
+    for k, spring in enumerate(springs):
+        for name, by in spring.moves:
+            moves[k, places.index(place[name])] = by
     width = slots.shape[1] - len(model.elastic.units)
-    return LoadedMachine(inner, pulls, model.geometry.slot_index[places], slots.shape, width)
+    return LoadedMachine(inner, pulls, np.array(places, dtype=np.intp), moves, slots.shape, width)

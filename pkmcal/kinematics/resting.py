@@ -37,8 +37,10 @@ class RestingMachine(CoreMachine):
         Without what yields.
     pulls : Pulls
         What pulls at it.
-    places : ndarray of int (s,)
-        Where the numbers that yield are in the flattened numbers of a geometry, rising.
+    places : ndarray of int (c,)
+        Where the numbers that move are in the flattened numbers of a geometry, rising.
+    moves : ndarray (s, c)
+        How far each of the numbers that yield moves these.
     shape : (int, int)
         Of a geometry: that of the inner machine with the numbers of `Elastic` behind each row,
         which the first row has.
@@ -57,6 +59,7 @@ class RestingMachine(CoreMachine):
         inner: CompiledMachine,
         pulls: Pulls,
         places: IntArray,
+        moves: FloatArray,
         shape: tuple[int, int],
         width: int,
     ) -> None:
@@ -67,6 +70,7 @@ class RestingMachine(CoreMachine):
         self._shape, self._width = shape, width
         springs = pulls.elastic.springs
         self._columns = self._within(places)
+        self._moves = None if np.array_equal(moves, np.eye(len(springs))) else moves
         angles = np.array([spring.unit == "rad" for spring in springs])
         size = float(inner.struct.size)
         self._scale = np.where(angles, 1.0, size)
@@ -142,7 +146,13 @@ class RestingMachine(CoreMachine):
     def yielding_twists(self, slots: FloatArray, pose: FloatArray, q: FloatArray) -> FloatArray:
         """Twists of the platform by the numbers that yield, (N, 6, s), at poses under load."""
         inside = self.under_load(slots, pose, q)
-        return self.inner.error_jacobian(inside, pose, q, self._columns, twists=True)
+        return self._of_springs(
+            self.inner.error_jacobian(inside, pose, q, self._columns, twists=True)
+        )
+
+    def _of_springs(self, by_column: FloatArray) -> FloatArray:
+        """What is by the numbers that move (…, c), by those that yield (…, s)."""
+        return by_column if self._moves is None else by_column @ self._moves.T
 
     def numbers(self, slots: FloatArray) -> FloatArray:
         """The numbers of `Elastic`, (k,) or (N, k)."""
@@ -160,7 +170,7 @@ class RestingMachine(CoreMachine):
         rigid = self.rigid(slots)
         found = np.array(np.broadcast_to(rigid, (len(given), *rigid.shape[-2:])), order="C")
         flat = found.reshape(len(given), rigid.shape[-2] * rigid.shape[-1])
-        flat[:, self._columns] += given
+        flat[:, self._columns] += given if self._moves is None else given @ self._moves
         return found
 
     def _forces(
@@ -177,12 +187,12 @@ class RestingMachine(CoreMachine):
         found: FloatArray = (twists * wrench[:, :, None]).sum(axis=1)
         if self.pulls.elastic.rods or self.pulls.elastic.anchors:
             found += self._on_limbs(pose, q, inside, numbers)
-        return found
+        return self._of_springs(found)
 
     def _on_limbs(
         self, pose: FloatArray, q: FloatArray, inside: FloatArray, numbers: FloatArray
     ) -> FloatArray:
-        """Return forces of weights on limbs on their own numbers, (N, s), the platform held."""
+        """Return forces of weights on limbs on their own numbers, (N, c), the platform held."""
         assert isinstance(self.inner, Machine | DrivenMachine)
         limbs = inside.shape[-2]
         weights = np.broadcast_to(self.pulls.at_anchors(numbers, limbs), (len(pose), limbs, 3))
@@ -202,7 +212,7 @@ class RestingMachine(CoreMachine):
         about = self.reference(slots) if near is None else near
         about = np.ascontiguousarray(np.broadcast_to(about, (count, self.actuators)))
         q = self.inner.inverse(rigid, pose, about)
-        given = np.full((count, len(self._columns)), np.nan)
+        given = np.full((count, len(self._compliance)), np.nan)
         left = np.flatnonzero(np.isfinite(q).all(axis=1))
         given[left] = 0.0
         for _ in range(MOST_STEPS):
@@ -264,7 +274,7 @@ class RestingMachine(CoreMachine):
         numbers = self.numbers(slots)
         force = self._forces(slots, pose, q, inside, numbers, self.carried)
         compliance = self.compliances(slots, q)
-        out = np.zeros((len(pose), len(self._columns), len(places)))
+        out = np.zeros((len(pose), len(self._compliance), len(places)))
         of_springs = {place: k for k, place in enumerate(self._compliance)}
         growing = {place: (k, spring) for k, spring, place in self._growing}
         for j, place in enumerate(places.tolist()):

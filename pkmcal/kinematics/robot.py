@@ -539,8 +539,8 @@ class Robot(Kinematics, Result):
         Raises
         ------
         ValueError, TypeError
-            A name that matches no number of a limb, a ratio, which does not yield, or a compliance
-            below 0.
+            A name that matches no number of a limb, a ratio, which does not yield, a compliance
+            below 0, or a stiffness in its place.
 
         Examples
         --------

@@ -9,14 +9,15 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pkmcal.arguments import number
+from pkmcal.arguments import instance, number
+from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray, as_rows
 from pkmcal.display import Table, fixed
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.carried import Load
 from pkmcal.kinematics.complete import completed
 from pkmcal.kinematics.loaded import LoadedMachine
-from pkmcal.kinematics.robot import Robot, require_parallel
+from pkmcal.kinematics.robot import Robot
 from pkmcal.result import Result
 from pkmcal.screw import from_pose
 
@@ -161,17 +162,22 @@ def matrix_cells(matrix: FloatArray) -> list[list[str]]:
 
 
 def stiffness(
-    robot: Robot, poses: ArrayLike, *, load: Load | None = None, at: ArrayLike = (0.0, 0.0, 0.0)
+    robot: Robot | SerialArm,
+    poses: ArrayLike,
+    *,
+    load: Load | None = None,
+    at: ArrayLike = (0.0, 0.0, 0.0),
 ) -> Stiffness:
     """Compute stiffness at poses, by the compliances of the machine's numbers.
 
     Parameters
     ----------
-    robot : Robot
+    robot : Robot or SerialArm
         One in which something yields.
-    poses : array_like (..., 6)
+    poses : array_like (..., 6) or (..., n)
         Where the tool is under the load, x y z in mm, α β γ in rad. Of a pose that the machine
-        cannot take, the coordinates that its file declares are kept (`Robot.complete`).
+        cannot take, the coordinates that its file declares are kept (`Robot.complete`). Of an arm
+        its joint coordinates as they are commanded, rad.
     load : Load, optional
         What it carries in place of the payload that its file states.
     at : array_like (3,), optional
@@ -197,22 +203,45 @@ def stiffness(
     >>> round(float(pk.stiffness(robot, robot.home).matrix[5, 5]), 6)
     111923.203972
     """
-    carrying = _yielding(robot) if load is None else _yielding(robot).under(load)
-    rows, shape = as_rows("poses", poses, 6)
+    _require_yielding(robot)
+    carrying = robot if load is None else robot.under(load)
     point, point_shape = as_rows("at", at, 3)
     if point_shape != ():
         raise ArgumentError(f"at must have shape (3,), found {point_shape}")
-    rows = completed(carrying, rows)
-    own = np.ascontiguousarray(carrying.frames.inward(rows))
-    machine, slots = carrying.machine, carrying.slots
+    if isinstance(carrying, SerialArm):
+        rows, shape = as_rows("poses", poses, carrying.n_joints)
+        twists, compliance, turned = _of_arm(carrying, rows)
+    else:
+        rows, shape = as_rows("poses", poses, 6)
+        twists, compliance, turned = _of_robot(carrying, rows)
+    lever = turned @ point[0]
+    twists[:, 3:] += np.cross(twists[:, :3], lever[:, :, None], axis=1)
+    found = np.einsum("nis,ns,njs->nij", twists, compliance, twists)
+    return Stiffness(found.reshape(*shape, 6, 6))
+
+
+def _of_robot(robot: Robot, rows: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Twists of the tool (N, 6, s) by what yields, compliances (N, s), and how the tool stands."""
+    rows = completed(robot, rows)
+    own = np.ascontiguousarray(robot.frames.inward(rows))
+    machine, slots = robot.machine, robot.slots
     assert isinstance(machine, LoadedMachine)
     q = machine.inverse(slots, own)
-    twists = carrying.frames.twists_outward(own, machine.yielding_twists(slots, own, q))
-    arm = from_pose(rows)[:, :3, :3] @ point[0]
-    twists[:, 3:] += np.cross(twists[:, :3], arm[:, :, None], axis=1)
-    found = np.einsum("nis,ns,njs->nij", twists, machine.compliances(slots, q), twists)
-    found[~np.isfinite(q).all(axis=1)] = np.nan
-    return Stiffness(found.reshape(*shape, 6, 6))
+    twists = robot.frames.twists_outward(own, machine.yielding_twists(slots, own, q))
+    twists[~np.isfinite(q).all(axis=1)] = np.nan
+    return twists, machine.compliances(slots, q), from_pose(rows)[:, :3, :3]
+
+
+def _of_arm(arm: SerialArm, theta: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """As `_of_robot`, of the joints of an arm at their commands (N, n)."""
+    yields = {
+        term.joint: value
+        for term, value in arm.joint_laws.numbers.items()
+        if term.kind == "compliance"
+    }
+    twists = arm.rigid.jacobian(arm.joint_laws.moved(theta), frame="tip")[..., [*yields]]
+    compliance = np.tile(list(yields.values()), (len(theta), 1))
+    return twists, compliance, arm.forward(theta)[:, :3, :3]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -252,7 +281,7 @@ class ComplianceTable(Result):
 
 
 def compliance_table(
-    robot: Robot, pose: ArrayLike, rated: float = 1000.0, *, load: Load | None = None
+    robot: Robot | SerialArm, pose: ArrayLike, rated: float = 1000.0, *, load: Load | None = None
 ) -> ComplianceTable:
     """Static compliance at a pose as ISO 9283 tests it: forces on the tool, axis by axis.
 
@@ -261,10 +290,10 @@ def compliance_table(
 
     Parameters
     ----------
-    robot : Robot
+    robot : Robot or SerialArm
         One in which something yields.
-    pose : array_like (6,)
-        x y z in mm, α β γ in rad.
+    pose : array_like (6,) or (n,)
+        x y z in mm, α β γ in rad; of an arm its joint coordinates as they are commanded, rad.
     rated : float
         The largest force, N.
     load : Load, optional
@@ -288,42 +317,58 @@ def compliance_table(
     >>> table.compliance[4].round(8)[:3]  # along +z
     array([8.93e-06, 8.93e-06, 8.93e-06])
     """
-    _yielding(robot)
+    _require_yielding(robot)
     limit = number("rated", rated, above=0.0)
-    rows, shape = as_rows("pose", pose, 6)
+    size = robot.n_joints if isinstance(robot, SerialArm) else 6
+    rows, shape = as_rows("pose", pose, size)
     if shape != ():
-        raise ArgumentError(f"pose must have shape (6,), found {np.shape(pose)}")
-    carried = _carried(robot, load)
+        raise ArgumentError(f"pose must have shape ({size},), found {np.shape(pose)}")
+    sense = np.repeat(np.eye(3), 2, axis=0) * np.array([1.0, -1.0] * 3)[:, None]
+    forces = (sense[:, None] * (limit * _STEPS)[:, None]).reshape(-1, 3)
+    forces = np.vstack([np.zeros((1, 3)), forces])
+    if isinstance(robot, SerialArm):
+        moved = _arm_under(robot, rows, load, forces)
+    else:
+        moved = _robot_under(robot, rows, load, forces)
+    away = (moved[1:] - moved[0]).reshape(6, len(_STEPS), 3)
+    return ComplianceTable(limit, limit * _STEPS, away)
+
+
+def _robot_under(
+    robot: Robot, rows: FloatArray, load: Load | None, forces: FloatArray
+) -> FloatArray:
+    """Places (N, 3) of the tool under forces (N, 3), at what holds a pose (1, 6) without them."""
+    carried = Load.stated(dict(robot.geometry.items())) if load is None else load
     held = robot.under(_with_force(carried, np.zeros((1, 3))))
     at = completed(held, rows)
     q = held.inverse(at)
     if not np.isfinite(q).all():
         raise ArgumentError(f"pose: {robot.name} cannot hold it")
-    sense = np.repeat(np.eye(3), 2, axis=0) * np.array([1.0, -1.0] * 3)[:, None]
-    forces = (sense[:, None] * (limit * _STEPS)[:, None]).reshape(-1, 3)
     there = robot.under(_with_force(carried, forces))
-    moved = there.forward(np.repeat(q, len(forces), axis=0), guess=at[0]).pose[:, :3]
-    before = held.forward(q, guess=at[0]).pose[0, :3]
-    return ComplianceTable(limit, limit * _STEPS, (moved - before).reshape(6, len(_STEPS), 3))
+    return there.forward(np.repeat(q, len(forces), axis=0), guess=at[0]).pose[:, :3]
 
 
-def _yielding(robot: Robot) -> Robot:
-    require_parallel(robot)
-    if not isinstance(robot.machine, LoadedMachine):
-        raise ArgumentError(
-            f"robot: nothing of {robot.name} yields: state stiffness or [compliance] in its file"
-        )
-    return robot
+def _arm_under(
+    arm: SerialArm, theta: FloatArray, load: Load | None, forces: FloatArray
+) -> FloatArray:
+    """As `_robot_under`, at commands (1, n) of an arm."""
+    there = arm.under(_with_force(Load() if load is None else load, forces))
+    found: FloatArray = there.forward(np.repeat(theta, len(forces), axis=0))[:, :3, 3]
+    return found
 
 
-def _carried(robot: Robot, load: Load | None) -> Load:
-    """Return a machine's load: the one given, or the payload that its file states."""
-    if load is None:
-        return Load.stated(dict(robot.geometry.items()))
-    load.rows(())
-    return load
+def _require_yielding(robot: Robot | SerialArm) -> None:
+    if isinstance(robot, SerialArm):
+        yields, how = robot.joint_laws.yielding, "state stiffness of its joints"
+    else:
+        instance("robot", robot, Robot, " or a SerialArm")
+        yields = isinstance(robot.machine, LoadedMachine)
+        how = "state stiffness or [compliance] in its file"
+    if not yields:
+        raise ArgumentError(f"robot: nothing of {robot.name} yields: {how}")
 
 
 def _with_force(load: Load, force: FloatArray) -> Load:
-    """The load with forces (N, 3) besides."""
+    """The load, one for all rows, with forces (N, 3) besides."""
+    load.rows(())
     return Load(load.mass, load.centre, np.asarray(load.force) + force, load.moment)

@@ -29,12 +29,15 @@ class LeftOut:
         determine what it depends on.
     without : ndarray (K, n)
         x as found without each cluster; along what is not determined it is 0.
+    found : ndarray (n,)
+        x as found from all rows.
     deviation : float
         Of the whitened residuals of the fit to all rows; NaN where no freedom is left.
     """
 
     missed: FloatArray
     without: FloatArray
+    found: FloatArray
     deviation: float
 
 
@@ -87,4 +90,4 @@ def leave_out(
             without[k] = back @ (found - design[rows].T @ part)
     freedom = count - float((design**2).sum())
     deviation = float(np.sqrt(left @ left / freedom)) if freedom >= 1.0 else float("nan")
-    return LeftOut(missed, without, deviation)
+    return LeftOut(missed, without, back @ found, deviation)

@@ -272,3 +272,56 @@ centre = [300, 0, 0]
         (tmp_path / "wrong.toml").write_text(one + wrong)
         with pytest.raises(pk.FileError, match=message):
             pk.load(tmp_path / "wrong.toml")
+
+
+@pytest.mark.parametrize("call", ["forward", "jacobian", "inverse"])
+def test_loads_are_as_many_as_rows(call: str) -> None:
+    arm, theta = loaded(rows=4), np.full((3, 6), 0.3)
+    asked = SIX.forward(theta) if call == "inverse" else theta
+    with pytest.raises(ValueError, match="load is of 4 rows, but 3 were asked for"):
+        getattr(arm, call)(asked)
+
+
+def test_stiffness_of_an_arm_is_what_small_forces_do_to_it() -> None:
+    """Against differences of the arm under load; and one joint against its lever by hand."""
+    arm = lawful().yielding({1: 2e-8, 2: 3e-8, 4: 2e-7, 5: 3e-7, 6: 4e-7}).replace(np.zeros((6, 6)))
+    rng = np.random.default_rng(3)
+    theta, at = rng.uniform(-1.2, 1.2, (4, 6)), np.array([20.0, -10.0, 60.0])
+    load = pk.Load(4.0, (0.0, 10.0, 50.0))
+    found = pk.stiffness(arm, theta, load=load, at=at).compliance
+    here = arm.under(load).forward(theta)
+    for k in range(3):
+        force = np.eye(3)[k] * 1e-2
+        lever = here[:, :3, :3] @ at
+        moment = np.cross(lever, force)
+        ends = [
+            arm.under(pk.Load(np.full(4, 4.0), (0.0, 10.0, 50.0), sign * np.tile(force, (4, 1)),
+                              sign * moment)).forward(theta)
+            for sign in (1.0, -1.0)
+        ]  # fmt: skip
+        places = [each[:, :3, :3] @ at + each[:, :3, 3] for each in ends]
+        moved = (places[0] - places[1]) / 2e-2
+        np.testing.assert_allclose(found[:, 3:, 3 + k], moved, atol=0.02 * np.abs(moved).max())
+    one = pk.SerialArm([[0, 1, 0]], [[0, 0, 0]], [600, 0, 0, 0, 0, 0]).yielding({1: 2e-8})
+    assert pk.stiffness(one, [0.0]).along([0, 0, 1]) == pytest.approx(600.0**2 * 2e-8)
+    with pytest.raises(ValueError, match="nothing of six yields"):
+        pk.stiffness(SIX, theta)
+
+
+def test_the_table_of_static_compliance_of_an_arm_is_that_of_forces_on_it() -> None:
+    arm = pk.SerialArm([[0, 1, 0]], [[0, 0, 0]], [600, 0, 0, 0, 0, 0]).yielding({1: 2e-8})
+    table = pk.compliance_table(arm, [0.3], rated=200.0)
+    turned = 2e-8 * 600.0 * np.cos(0.3) * 200.0  # rad, about y: a force down turns by more
+    np.testing.assert_allclose(
+        table.displacement[4, 9], 600.0 * np.array([
+            np.cos(0.3 - turned) - np.cos(0.3), 0.0, -np.sin(0.3 - turned) + np.sin(0.3)
+        ]), atol=1e-9,
+    )  # fmt: skip
+    np.testing.assert_allclose(table.displacement[2:4], 0.0, atol=1e-12)
+
+
+def test_a_stiffness_in_place_of_a_compliance_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"joint 1 is 400000.* its compliance is 2\.5e-09"):
+        SIX.yielding({1: 4e5})
+    with pytest.raises(ValueError, match=r"offset\* is 20000.* its compliance is 5e-05"):
+        pk.load("hexapod").yielding({"offset*": 2e4})

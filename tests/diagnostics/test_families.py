@@ -232,3 +232,15 @@ def test_zeros_of_a_machine_that_does_not_turn_are_readings(hexapod: pk.Robot) -
     assert not {"constant-component", "family-off"} & {each.check for each in found.verdict.said}
     turns = replace(found.fit.equations.table.sets[0], sigma=1e-3)
     assert not list(unlike_families(pk.identify(robot, turns, "offset*")))
+
+
+@pytest.mark.parametrize("name", ["3rrr-planar", "five-bar"])
+def test_a_component_that_was_not_read_is_exchanged_with_none(name: str) -> None:
+    """Other rows would be read than those that are judged: fewer have smaller residuals."""
+    robot = pk.load(name)
+    q = robot.inverse(pk.sample_poses(robot, 40, seed=1), match=True)
+    true = robot.replace({"offset1": robot.geometry["offset1"] + 1e-3})
+    seen = pk.VirtualMachine(true, noise=0.02, seed=1).measure(q, "position").values.copy()
+    seen[:, 2] = np.nan
+    found = pk.identify(robot, pk.Measurements(q, seen, "position"), "offset*")
+    assert "other-reading" not in {said.check for said in found.verdict.said}

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
-from scipy.stats import chi2
+from scipy.stats import binom, chi2
 
 import pkmcal as pk
 from pkmcal.arrays import FloatArray
+from pkmcal.diagnostics.loads import _negative
 
 NOISE = 0.01
 MACHINES = [  # what yields, mm/N or rad/(N mm), and loads under which it sags by some 0.1 mm
@@ -238,6 +240,32 @@ def test_a_compliance_below_zero_is_said_kept_and_checked(tmp_path: Path) -> Non
     again = pk.load(tmp_path / "wrong.toml")
     assert np.array_equal(again.geometry.values, found.robot.geometry.values)
     assert any("no spring" in each.what for each in pk.check_geometry(again).findings)
+
+
+def test_a_compliance_of_0_is_called_negative_by_chance_alone() -> None:
+    """The least of six that are tested, by their degrees of freedom: at 1 %."""
+    rng, said, freedom = np.random.default_rng(0), 0, 12.0
+    names = tuple(f"compliance.offset{i}" for i in range(1, 7))
+    values = rng.standard_t(freedom, size=(4000, 6))
+    for own in values:
+        found = SimpleNamespace(
+            free=names, values=own, stderr=np.ones(6), parameter_dof=np.full(6, freedom)
+        )
+        said += len(_negative(found))
+    assert binom.ppf(1e-4, 4000, 0.01) <= said <= binom.ppf(1.0 - 1e-4, 4000, 0.01)
+
+
+def test_loads_that_rows_follow_are_no_shift_of_readings() -> None:
+    """All without a load first, then all with it: named once, as what it is."""
+    robot, true = yielding("hexapod", "offset*", 1.5e-4)
+    q = twice(robot, 25)
+    load = pk.Load(mass=np.repeat([0.0, 80.0], 25))
+    rows = pk.VirtualMachine(true, NOISE, seed=1).measure(q, "pose", load=load)
+    with pytest.warns(pk.CalibrationWarning):
+        found = pk.identify(robot, rows, free="offset*")
+    said = {each.check for each in found.verdict.said}
+    assert "follows-loads" in said
+    assert not said & {"measuring-order", "late-readings", "two-machines", "causes"}
 
 
 def test_without_loads_and_effects_the_estimate_has_the_same_bits() -> None:

@@ -7,6 +7,8 @@ and the springs agree (`weights.at_rest`), which the products do not know.
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,6 +20,7 @@ from pkmcal.arms.joint_pulls import JointPulls
 from pkmcal.arms.weights import at_rest, gravity_torques
 from pkmcal.arrays import FloatArray
 from pkmcal.calibration.rigid import rigid_arm
+from pkmcal.diagnostics.sag import sag_that_helps
 from pkmcal.diagnostics.waves import _alike, scan_waves
 from pkmcal.fitted.left_out import compared_by_poses
 from pkmcal.kinematics.arm_machine import ArmMachine
@@ -264,7 +267,8 @@ def test_compliances_of_joints_are_found_by_payloads_alone() -> None:
     sigma = np.array([found.parameters[name]["stderr"] for name in names])
     assert (np.abs(values - SOFT[1:]) < 4 * sigma + 0.01 * SOFT[1:]).all()
     assert (sigma[:4] < 0.1 * SOFT[1:5]).all()
-    assert any("compliance1" in each for each in found.unidentifiable)  # nothing turns it
+    assert "compliance1" in found.unidentifiable  # nothing turns it
+    assert found.parameters["compliance1"]["value"] == 0.0
     held = carried(np.repeat([2.5, 9.0], 20), 2, true)
     again = pk.identify(ARM, m, effects=[pk.Sag("all"), pk.Elasticity("joint*")], holdout=held)
     assert again.holdout_rms < 1.3 * np.sqrt(3) * NOISE
@@ -273,6 +277,65 @@ def test_compliances_of_joints_are_found_by_payloads_alone() -> None:
     assert alone.holdout_rms > 10 * again.holdout_rms
     (said,) = [each for each in alone.verdict.reasons if "residuals follow the loads" in each]
     assert "--effects 'elasticity=joint*'" in said
+
+
+def test_a_prior_of_lengths_does_not_bind_compliances_of_joints() -> None:
+    """As it does not bind those of limbs: a compliance is no length."""
+    m, effects = carried(np.repeat([0.0, 5.0], 40), 1, built(11)), [pk.Elasticity("joint*")]
+    free, tight = (pk.identify(ARM, m, effects=effects, prior=prior) for prior in (10.0, 0.3))
+    for name in (f"compliance{i}" for i in range(2, 7)):
+        one, other = free.parameters[name], tight.parameters[name]
+        assert abs(one["value"] - other["value"]) < one["stderr"]
+
+
+def test_advice_under_two_payloads_ends_with_all_that_yields() -> None:
+    """Each advice taken in turn: none names waves that are not there, the last leaves nothing."""
+    m = carried(np.repeat([0.0, 5.0], 40), 1, built(11))
+    for begin in ((), (pk.Elasticity("joint*"), pk.Sag(2))):
+        arguments: dict[str, Any] = {"effects": begin}
+        for _ in range(4):
+            found = pk.identify(ARM, m, **arguments)
+            said = found.verdict.said
+            remedies = [one for each in said for one in each.remedies if one.argument == "effects"]
+            assert not any(each.check in ("waves", "causes") for each in said)
+            if not remedies:
+                break
+            assert found.verdict.state == "doubtful"
+            arguments = remedies[0].applied(arguments)
+        options = {each.option for each in arguments["effects"]}
+        assert options in ({"elasticity=joint*", name} for name in ("sag", "sag=all"))
+        assert found.verdict.state == "calibrated"
+
+
+def test_sag_of_all_joints_is_named_where_that_of_two_does_not_help() -> None:
+    """A wrist that yields on an arm whose main joints do not."""
+    wrist = np.array([0.0, 0.0, 0.0, 0.0, 400.0, 400.0]) * 1e-8
+    m = measured(commands(40, 90), built(12), 91, wrist, frame=NOWHERE)
+    (said,) = [each for each in pk.identify(ARM, m).verdict.said if each.check == "sag-lacking"]
+    assert "--effects sag=all" in said.text and said.level == "doubt"
+
+
+def test_numbers_move_by_sag_as_far_as_is_said() -> None:
+    """By the linear model at the rigid arm's solution, as by another fit."""
+    m = measured(commands(40, 11), built(4), 12, 0.2 * SOFT, frame=NOWHERE)
+    rigid, soft = pk.identify(ARM, m), pk.identify(ARM, m, effects=[pk.Sag()])
+    finding = sag_that_helps(rigid.fit)
+    assert finding is not None and finding.effect == pk.Sag()
+    known = [name for name in rigid.free if np.isfinite(rigid.parameters[name]["stderr"])]
+    moved = [
+        (soft.parameters[name]["value"] - rigid.parameters[name]["value"])
+        / rigid.parameters[name]["stderr"]
+        for name in known
+    ]
+    np.testing.assert_allclose(finding.comparison.shift, np.sqrt(np.mean(np.square(moved))), 0.02)
+
+
+def test_sag_alone_may_be_found() -> None:
+    """Of an arm whose errors are known: nothing else moves."""
+    m = measured(commands(40, 11), ARM, 12, 0.2 * SOFT, frame=NOWHERE)
+    found = pk.identify(ARM, m, fix="joint*", effects=[pk.Sag("all")])
+    assert found.verdict.state == "calibrated"
+    assert any("the arm sags" in each for each in found.verdict.remarks)
 
 
 def test_the_arm_without_laws_is_the_better_of_two() -> None:
@@ -298,6 +361,29 @@ def test_gears_are_found_with_their_waves() -> None:
     for name, value in zip(names, numbers, strict=True):
         own = found.parameters[name]
         assert abs(own["value"] - value) < 4 * own["stderr"] < abs(value)
+
+
+def test_linked_axes_of_a_palletiser_are_found_and_undone(tmp_path: Path) -> None:
+    """A forearm that keeps its angle as the upper arm turns, by a ratio that is a little off."""
+    ARM.save(tmp_path / "arm.toml")
+    head, *joints = (tmp_path / "arm.toml").read_text(encoding="utf-8").split("[[joint]]\n")
+    joints[2] = "drive = { coupled = [{ joint = 2, by = -1.0 }] }\n" + joints[2]
+    (tmp_path / "linked.toml").write_text("[[joint]]\n".join([head, *joints]), encoding="utf-8")
+    linked = pk.load(tmp_path / "linked.toml")
+    assert linked.joint_laws.names == ("coupling3.2",)
+    ratio = -1.0003
+    true = linked.replace(built(15).joint_errors)
+    true = true.with_laws(true.laws.with_values(np.array([ratio])))
+    theta = commands(80, 100)
+    m = pk.VirtualMachine(true, NOISE, seed=101).measure(theta, "position", TARGETS[0])
+    found = pk.identify(linked, m, effects=[pk.Coupling([(3, 2)])])
+    own = found.parameters["coupling3.2"]
+    assert abs(own["value"] - ratio) < 4 * own["stderr"] < 1e-4
+    assert pk.identify(linked, m).rms > 1.4 * found.rms
+    tool = found.robot.forward(theta)
+    again = found.robot.inverse(tool, guess=theta + 1e-2)
+    assert again.ok.all()
+    np.testing.assert_allclose(found.robot.forward(again.theta), tool, atol=1e-9)
 
 
 def test_backlash_is_found_from_where_joints_came() -> None:

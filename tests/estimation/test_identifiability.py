@@ -7,7 +7,13 @@ import pytest
 
 import pkmcal as pk
 from pkmcal.calibration.identify import identify
-from pkmcal.estimation.identifiability import as_sum, listed, observability, sparse_basis
+from pkmcal.estimation.identifiability import (
+    as_sum,
+    decompose,
+    listed,
+    observability,
+    sparse_basis,
+)
 from pkmcal.measurements.virtual_machine import VirtualMachine
 
 from ..simulated import tilted_poses
@@ -79,6 +85,19 @@ def test_what_is_unidentifiable_keeps_its_value() -> None:
     assert values["platform3.x"] == pytest.approx(0.0, abs=1e-12)
     # the smallest change that explains the measurements is no larger than the true one
     assert np.linalg.norm(found.values - found.start) <= np.hypot(0.4, 0.5)
+
+
+def test_what_nothing_reads_is_no_part_of_what_is_read() -> None:
+    """Not even by rounding: it keeps its value to the last bit."""
+    rng = np.random.default_rng(0)
+    jacobian = rng.normal(size=(9, 5))
+    jacobian[:, 2] = 0.0
+    singular, basis = decompose(jacobian[:4], jacobian[4:])
+    assert (basis[2, :4] == 0.0).all() and basis[2, 4] == 1.0 and singular[4] == 0.0
+    np.testing.assert_allclose(basis.T @ basis, np.eye(5), atol=1e-14)
+    read = np.delete(jacobian, 2, axis=1)
+    np.testing.assert_allclose(singular[:4] ** 2, np.linalg.eigvalsh(read.T @ read)[::-1])
+    assert decompose(np.zeros((3, 2)))[0].tolist() == [0.0, 0.0]
 
 
 def test_observability_indices_of_known_singular_values() -> None:

@@ -207,6 +207,15 @@ def test_an_effect_that_a_check_proposes_is_the_one_that_the_calibration_has(eff
     assert [each.option for each in read_effects(job.effects)] == [effect.option]
 
 
+def test_an_effect_that_a_check_proposes_stands_in_for_that_of_its_name() -> None:
+    job = Calibration("arm.toml", ("a.csv",), effects=("elasticity=joint*,sag", "harmonics=1"))
+    after = job.with_remedy(Remedy("effects", (pk.Sag("all"),)))
+    assert after.effects == ("elasticity=joint*", "harmonics=1", "sag=all")
+    assert replace(job, effects=("auto",)).with_remedy(Remedy("effects", (pk.Sag(),))).effects == (
+        "sag",
+    )
+
+
 @pytest.mark.parametrize(
     "remedy",
     [
