@@ -28,6 +28,7 @@ LENS = {
     "k1": -0.10, "k2": 0.08, "p1": 4e-4, "p2": -3e-4, "k3": -0.02, "width": 2448, "height": 2048,
 }  # fmt: skip
 NOISE, ERRORS, ELSEWHERE = 0.1, 0.3, 40  # px; mm and mrad; poses
+_FEWEST = 30  # of the poses elsewhere that machine and drawing both have to reach
 _DRAWN = 20  # poses a picture, of which those are taken that show the whole board
 JOINTS = ("base*", "platform*", "offset*")
 
@@ -152,8 +153,10 @@ def elsewhere(
     poses = pk.sample_poses(true, ELSEWHERE, seed=77, share=scenario.share)
     q = pk.load(scenario.machine).inverse(poses)
     right, mine = true.forward(q).pose, found.robot.forward(q).pose
-    if not np.isfinite([right, mine]).all():
+    reached = np.isfinite(right).all(axis=1) & np.isfinite(mine).all(axis=1)
+    if reached.sum() < _FEWEST:
         return None
+    q, right, mine = q[reached], right[reached], mine[reached]
     names = list(found.robot.geometry.names)
     of = [i for i, name in enumerate(found.free) if name in names]
     rates = found.robot.error_twists(mine, q)[:, :, [names.index(found.free[i]) for i in of]]

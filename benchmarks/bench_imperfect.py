@@ -28,6 +28,7 @@ from benchmarks.imperfect import (  # noqa: F401  # they add scenarios
     silent,
     sound,
     statements,
+    unseen,
 )
 from benchmarks.imperfect.cases import SCENARIOS, Case, Meant, numbers
 from benchmarks.timing import Report

@@ -94,6 +94,7 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.measurements.circular_test import circular_test as circular_test
     from pkmcal.measurements.measurement_csv import read_measurements as read_measurements
     from pkmcal.measurements.measurements import Measurements as Measurements
+    from pkmcal.measurements.pnp import from_pnp as from_pnp
     from pkmcal.measurements.probe import probed as probed
     from pkmcal.measurements.tracker import Tracker as Tracker
     from pkmcal.measurements.virtual_machine import VirtualMachine as VirtualMachine
@@ -169,6 +170,7 @@ _HOMES = {
     "measurements.circular_test": ("CircularTest", "circular_test"),
     "measurements.measurement_csv": ("read_measurements",),
     "measurements.measurements": ("Measurements",),
+    "measurements.pnp": ("from_pnp",),
     "measurements.probe": ("probed",),
     "measurements.tracker": ("Tracker",),
     "measurements.virtual_machine": ("VirtualMachine",),

@@ -280,9 +280,9 @@ def report(work: Work, state: Table, given: Table, say: Say) -> Table:
         report=REPORT, certificate="certificate.toml" if certificate else None, force=True
     )
     sources = work.read(project)
-    Written.planned(asked, project.calibration.robot, sources.robot, work.inputs).write_report(
-        found
-    )
+    Written.planned(
+        asked, project.calibration.robot, sources.robot, sources.measured, work.inputs
+    ).write_report(found)
     command = quoted([*project.calibration.argv(), *asked.options()])
     return {"files": [_file(f"{REPORT}/report.html", "the report, one file that needs no network"),
                       _file(f"{REPORT}/report.json", "all results as data")],

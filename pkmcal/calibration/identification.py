@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from pkmcal import arguments
 from pkmcal.arrays import FloatArray, as_rows, propagate
 from pkmcal.calibration import summary
-from pkmcal.core import instruments
+from pkmcal.core.instruments import points
 from pkmcal.diagnostics.breakeven import Breakeven, breakeven, in_words
 from pkmcal.diagnostics.checks import AT_ONCE, CHECKS
 from pkmcal.diagnostics.diagnosis import Diagnosis
@@ -27,9 +27,12 @@ from pkmcal.display import Table
 from pkmcal.effects.expansion import in_words as heat_in_words
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.fitted.held_numbers import considered_places
+from pkmcal.fitted.instruments import CalibratedPicture, instruments, pictures
+from pkmcal.fitted.machine_accuracy import machine_accuracy
 from pkmcal.fitted.row_names import row_names
 from pkmcal.fitted.solution import Machine, Solution
 from pkmcal.kinematics.calibratable import as_machine, as_parallel
+from pkmcal.readings.reading import Reading
 from pkmcal.result import Result
 
 if TYPE_CHECKING:
@@ -144,6 +147,28 @@ class Identification(Solution[Machine], Result):
             "change": self.values - self.start,
         }
 
+    @cached_property
+    def instruments(self) -> tuple[Reading, ...]:
+        """The instrument of each set as it was found: a camera with its lens where it is.
+
+        Of sessions that of the last row's.
+        """
+        equations, theta = self.fit.equations, self.fit.end.theta
+        sets = range(len(equations.table.sets))
+        return tuple([*instruments(equations, theta, i)][-1][1] for i in sets)
+
+    @cached_property
+    def pictures(self) -> tuple[CalibratedPicture, ...]:
+        """What each picture of a board shows beside the calibration; empty without a camera."""
+        return tuple(pictures(self))
+
+    def _by_itself(self) -> FloatArray:
+        """Standard deviation of the platform at the measured poses but for its frames, mm (N,)."""
+        end = self.fit.end
+        at = self.fit.parameters.robot.as_commands(end.pose, end.actuators)
+        places = at[np.isfinite(end.pose).all(axis=1)]
+        return machine_accuracy(self.fit, places, places)
+
     def robot_of(self, session: str) -> Machine:
         """The machine with the numbers that it had in a session.
 
@@ -199,7 +224,7 @@ class Identification(Solution[Machine], Result):
         machine = as_machine(self.robot if session is None else self.robots[session])
         at, actuators, shape = machine.commanded(poses)
         by_numbers = machine.error_twists(at, actuators)[:, :, chosen.places]
-        by_geometry = instruments.points(at, place)[1] @ by_numbers
+        by_geometry = points(at, place)[1] @ by_numbers
         own = chosen.geometry_of(session)
         variance = propagate(by_geometry, self.fit.covariance[np.ix_(own, own)])
         sure = self.fit.uncertainty
@@ -207,7 +232,7 @@ class Identification(Solution[Machine], Result):
             follow = sure.reported[own] @ sure.considered
             places, root = considered_places(chosen)
             alone = machine.error_twists(at, actuators)[:, :, places]
-            moved_by = instruments.points(at, place)[1] @ alone @ root - by_geometry @ follow
+            moved_by = points(at, place)[1] @ alone @ root - by_geometry @ follow
             variance += (moved_by**2).sum(axis=(1, 2)) - ((by_geometry @ follow) ** 2).sum(
                 axis=(1, 2)
             )
@@ -309,6 +334,9 @@ class Identification(Solution[Machine], Result):
             yield summary.filled("", heat)
         yield summary.misfit_table(self)
         yield summary.quality(self)
+        if self.pictures:
+            yield summary.pictures(self.pictures)
+            yield summary.by_itself(self._by_itself())
         datasets, chosen = self.fit.equations.prediction.datasets, self.fit.parameters
         framed = len(self.free) > len(chosen.places) or chosen.robot.kind == "arm"
         if self.datum.names:

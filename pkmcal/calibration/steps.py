@@ -198,6 +198,8 @@ def with_component_noise(fit: Fit) -> Fit:
         estimate = again.solve(estimate.evaluation)
     except ArgumentError:  # grossly off: what there is says more than an error
         return fit
+    if problem.equations.failures(estimate.evaluation):
+        return fit
     return replace(fit, problem=problem, estimator=again, estimate=estimate, classes=classes)
 
 

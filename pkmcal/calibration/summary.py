@@ -9,11 +9,12 @@ from dataclasses import replace
 import numpy as np
 
 from pkmcal import display
-from pkmcal.arrays import BoolArray
-from pkmcal.display import Table, first_rows
+from pkmcal.arrays import BoolArray, FloatArray, rms
+from pkmcal.display import Table, first_rows, printable
 from pkmcal.estimation.identifiability import listed
 from pkmcal.fitted.distances import Distances
 from pkmcal.fitted.holdout import HeldOut
+from pkmcal.fitted.instruments import CalibratedPicture
 from pkmcal.fitted.nuisances import Nuisance
 from pkmcal.fitted.solution import Solution
 from pkmcal.statistics.noise import SIGNIFICANT
@@ -105,6 +106,40 @@ def quality(found: Solution) -> str:
         facts.append(text)
     facts.append(" ".join(f"{key} {value:.2g}" for key, value in found.observability.items()))
     return filled("", "; ".join(facts))
+
+
+def pictures(listed: Sequence[CalibratedPicture]) -> str:
+    """How far pictures show their board from where the machine is, rms, and the worst of them."""
+    facts = []
+    for use in ("fitted", "held out"):
+        own = [each for each in listed if each.use == use and np.isfinite(each.seen.across)]
+        if own:
+            across, along, corners = (
+                rms(np.array([getattr(each.seen, name) for each in own]))
+                for name in ("across", "along", "off")
+            )
+            facts.append(
+                f"of {len(own)} pictures {use} the board is off by {_short(across)} mm across the"
+                f" line of sight and {_short(along)} along it, corners by {_short(corners)} px"
+                " beyond that"
+            )
+    worst = max(listed, key=lambda each: np.nan_to_num(each.seen.off_commanded, nan=-1.0))
+    shown = f"worst {printable(worst.name)}, {_short(worst.seen.off_commanded)} px in all"
+    return filled("", "; ".join([*facts, shown])) if facts else ""
+
+
+def by_itself(deviation: FloatArray) -> str:
+    """How well the machine is known at the measured poses, wherever its frames lie."""
+    sure = deviation[np.isfinite(deviation)]
+    if not len(sure):
+        return filled("", "how the machine moves is not determined at the measured poses")
+    unknown = len(deviation) - len(sure)
+    beyond = f"; not determined at {unknown} of them" if unknown else ""
+    return filled(
+        "",
+        f"the machine is known to ± {_short(rms(sure))} mm at the measured poses, wherever its base"
+        f" and platform are{beyond}",
+    )
 
 
 def _count(dof: float) -> str:

@@ -13,6 +13,7 @@ from pkmcal.cli.camera_options import BoardSize, BoardsSeen, CameraOn, Lenses, L
 from pkmcal.cli.measured import (
     Columns,
     Controller,
+    FromPnp,
     Ignore,
     InvertPoses,
     JoinBy,
@@ -220,6 +221,7 @@ def calibrate(
     units: Units = None,
     rotation: Rotation = None,
     invert_poses: InvertPoses = False,
+    from_pnp: FromPnp = None,
     probe_offset: ProbeOffset = None,
     camera: Lenses = None,
     camera_on: CameraOn = "base",
@@ -229,7 +231,8 @@ def calibrate(
         typer.Option(
             rich_help_panel=WRITTEN,
             metavar="DIR",
-            help="Write robot.toml, as calibrated, and residuals.png.",
+            help="Write robot.toml, as calibrated, residuals.png, and of a camera camera.yaml, its"
+            " lens and where it is.",
         ),
     ] = None,
     report: Annotated[
@@ -280,7 +283,7 @@ def carried_out(job: Calibration, asked: Writing, json: bool) -> int:
     inputs = Inputs()
     sources = calibrating.read(job, inputs, tell)
     arguments = calibrating.arguments(job, sources, tell)
-    written = Written.planned(asked, job.robot, sources.robot, inputs)
+    written = Written.planned(asked, job.robot, sources.robot, sources.measured, inputs)
     with progress("identifying"):
         found = calibrating.identified(sources, arguments)
     rigid = None
@@ -323,6 +326,8 @@ def _say_written(written: Written, found: Identification, rigid: object) -> None
         if written.urdf:
             how = f"; {rigid}" if rigid else ""
             say(f"URDF with the joint errors in its origins: {machine.paths[2]}{how}")
+        for path in (each for each in machine.paths if each.name in written.instruments):
+            say(f"camera as found, its lens and where it is: {path}")
     if report is not None:
         say(f"\nreport: {report.paths[0]}")
     first = report or machine

@@ -77,6 +77,17 @@ InvertPoses = Annotated[
         " board on the base.",
     ),
 ]
+FromPnp = Annotated[
+    str | None,
+    typer.Option(
+        "--from-pnp",
+        rich_help_panel=READING,
+        metavar="f=PX,board=WxH",
+        help="Poses are those of a board in axes of a camera, as other software found them in"
+        " pictures (PnP): focal length in px and size of the board in mm say which way each is"
+        " sure. noise=PX as well, or it is estimated. --camera-on says what the camera is on.",
+    ),
+]
 ProbeOffset = Annotated[
     str | None,
     typer.Option(

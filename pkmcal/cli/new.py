@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fnmatch
 import os
 import shlex
 from collections.abc import Iterable, Sequence
@@ -20,6 +21,7 @@ from pkmcal.files.toml_lines import Source
 from pkmcal.geometry import robot_file
 from pkmcal.geometry.limb_kinds import ALIASES, KINDS
 from pkmcal.geometry.model import CHAIN
+from pkmcal.loading import load_parallel
 from pkmcal.report.as_json import as_json
 
 _HEAD = """\
@@ -33,7 +35,7 @@ _PARALLEL = """\
 # [parameters]  names for numbers that limbs share: `radius = 160.0` here, "radius" there
 # [calibration] free: what is found unless --free says otherwise; wildcards are allowed
 # [uncertainty] how wrong numbers may be that are not found, one standard deviation:
-#               `"gain*" = 1e-3`, `"base*" = 0.05`; common = { "gain*" = 1e-3 }: all alike
+#               `%s`; common = { "gain*" = 1e-3 }: all alike
 # [frames]      base, tool: poses of the machine's frames in yours, if they differ
 # [stated]      what a data sheet claims, to compare: `rod = 340.0`
 # [[limb]]      one for each, counted from 1 in the names of its numbers (base1.x, offset1 …)
@@ -139,9 +141,16 @@ def template(machine: str, file: str = "robot.toml") -> str:
         raise ArgumentError(f"unknown machine {machine!r}{did_you_mean(machine, known)}")
     content, place, _ = robot_file.located(machine)
     text, data = content.decode(), Source(content, place).data
-    keys = _ARM if is_arm(data) else _PARALLEL + _of_limbs(data["limb"])
+    keys = _ARM if is_arm(data) else _PARALLEL % _uncertain(machine) + _of_limbs(data["limb"])
     called = shlex.quote(file) if file.isprintable() else "FILE"  # a line stays a line
     return f"{_HEAD.format(name=machine, file=called)}{keys}#\n{text}"
+
+
+def _uncertain(machine: str) -> str:
+    """Return an example of lengths of this machine: points on the base, or joints of a chain."""
+    names = load_parallel(machine).geometry.names
+    kinds = [f'"{kind}" = 0.05' for kind in ("base*", "limb*.d?") if fnmatch.filter(names, kind)]
+    return ", ".join(['"gain*" = 1e-3', *kinds])
 
 
 def _of_limbs(limbs: Sequence[dict[str, object]]) -> str:

@@ -14,6 +14,8 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray
 from pkmcal.display import displayed
+from pkmcal.estimation.parameters import Parameters
+from pkmcal.estimation.uncertain_numbers import uncertain_names
 from pkmcal.fitted.fit import Fit
 from pkmcal.fitted.held_numbers import held_numbers
 from pkmcal.geometry.elastic import is_elastic
@@ -36,7 +38,7 @@ class Breakeven:
     Attributes
     ----------
     kinds : tuple of str
-        The numbers, as wildcards.
+        The numbers, as wildcards where none of that kind is stated.
     unit : str
         "mm", "rad" or "1".
     deviation : float
@@ -76,9 +78,25 @@ def breakeven(fit: Fit) -> tuple[Breakeven, ...]:
         mine = [i for i, own in enumerate(held.units) if own == unit]
         moved = float((follow[:, mine] ** 2).sum())
         if moved > 0.0 and (wrong := float(np.sqrt(3.0 * total / moved))) <= most[unit]:
-            kinds = dict.fromkeys(re.sub(r"[0-9].*", "*", held.names[i]) for i in mine)
-            found.append(Breakeven(tuple(kinds), unit, wrong))
+            kinds = _kinds([held.names[i] for i in mine], chosen)
+            found.append(Breakeven(kinds, unit, wrong))
     return tuple(found)
+
+
+def _kinds(names: list[str], chosen: Parameters) -> tuple[str, ...]:
+    """Names as wildcards, but of a kind of which some are stated: these do not count."""
+    geometry, asked = chosen.robot.geometry, chosen.asked.uncertainty
+    stated = {*uncertain_names(asked, chosen.robot, ()), *_considered(chosen)}
+    found = dict[str, None]()
+    for name in names:
+        kind = re.sub(r"[0-9].*", "*", name)
+        found[name if stated.intersection(geometry.match(kind)) else kind] = None
+    return tuple(found)
+
+
+def _considered(chosen: Parameters) -> list[str]:
+    """Numbers that are held, and for whose errors ± allow."""
+    return uncertain_names(StatedUncertainty(chosen.asked.uncertainty.consider), chosen.robot, ())
 
 
 def in_words(found: tuple[Breakeven, ...]) -> str:
@@ -99,7 +117,7 @@ def _candidates(fit: Fit, robot: Calibratable) -> list[str]:
     others = [
         name
         for name, unit in zip(geometry.names, geometry.units, strict=True)
-        if name not in free | tied and unit in _KINDS
+        if name not in {*free, *tied, *_considered(chosen)} and unit in _KINDS
         if not is_elastic(name) and not is_of_load(name)
     ]
     own = [geometry.names.index(name) for name in others]

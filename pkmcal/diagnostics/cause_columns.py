@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -15,11 +15,12 @@ from pkmcal.effects.gears import Coupling, Harmonics
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.exceptions import ArgumentError
 from pkmcal.fitted.fit import Fit
-from pkmcal.fitted.held_numbers import held_numbers
+from pkmcal.fitted.held_numbers import bound_names, bound_numbers
 from pkmcal.fitted.left_out import effect_columns
 from pkmcal.geometry.stated_uncertainty import SCALE, StatedUncertainty
 from pkmcal.kinematics.calibratable import Calibratable, as_arm
 from pkmcal.readings.predicted import Predicted
+from pkmcal.readings.reading import HeldNumbers
 from pkmcal.statistics.score_test import Columns
 
 _LEAST_TRAVEL = 0.02  # of the machine's length, from which a place is more than an error
@@ -155,12 +156,12 @@ def _sag(fit: Fit) -> Columns | None:
 
 
 def _numbers(stated: StatedUncertainty) -> Callable[[Fit], Columns | None]:
-    """Columns of numbers that the fit held."""
+    """Columns of numbers that measurements could not move."""
 
     def columns(fit: Fit) -> Columns | None:
         if SCALE in stated.own and fit.uncertainty.mixed:
             return None  # effects need poses that follow from the actuators
-        held = held_numbers(fit.uncertainty, _at(fit), stated)
+        held = bound_numbers(fit.uncertainty, _at(fit), stated)
         return None if held is None else held.columns
 
     return columns
@@ -175,9 +176,11 @@ def _gains(fit: Fit) -> Columns | None:
 
 def _lean(fit: Fit) -> Columns | None:
     """All targets sit elsewhere by the same: on the platform, where they are known."""
+    bound = bound_names(fit.uncertainty, _at(fit))
     known = [
         any(
-            each.role == each.argument == "target" and not each.estimated
+            each.role == each.argument == "target"
+            and all(name in bound for own in each.estimated.values() for name in own.names)
             for each in data.dependences()
         )
         for data in fit.equations.prediction.datasets
@@ -238,6 +241,37 @@ def _of_effect(effect: Harmonics | Coupling) -> Callable[[Fit], Columns | None]:
     return columns
 
 
+def _of_instruments(fit: Fit) -> Iterator[Cause]:
+    """Causes that instruments have: numbers of theirs that the fit holds."""
+    kinds = {type(data.measured.instrument) for data in fit.equations.prediction.datasets}
+    for each in dict.fromkeys(held for kind in kinds for held in kind.held):
+        yield Cause(each.name, each.cure, _held(each))
+
+
+def _held(held: HeldNumbers) -> Callable[[Fit], Columns | None]:
+    """Columns of numbers of instruments, of all alike, in sets that do not look for them."""
+
+    def columns(fit: Fit) -> Columns | None:
+        known = [
+            held in data.measured.instrument.held
+            and all(
+                not any(np.isin(held.slots, own.slots).any() for own in each.estimated.values())
+                for each in data.dependences()
+                if each.argument == held.argument
+            )
+            for data in fit.equations.prediction.datasets
+        ]
+
+        def change(i: int, rows: slice, seen: Predicted) -> FloatArray:
+            if known[i] and held.argument in seen.by:
+                return seen.by[held.argument][rows][:, :, list(held.slots)]
+            return np.zeros((*seen.values[rows].shape, len(held.slots)))
+
+        return of_rows(fit, change) if any(known) else None
+
+    return columns
+
+
 CAUSES = (
     Cause("lag: readings before the machine stood still", "wait longer before a reading", _lag),
     Cause(
@@ -266,7 +300,16 @@ CAUSES = (
 
 def possible(fit: Fit) -> Iterator[tuple[Cause, Columns]]:
     """The causes that there may be in this fit, and their columns."""
-    for cause in (*CAUSES, *_of_arm(fit)):
+    yield from _with_columns(fit, (*CAUSES, *_of_instruments(fit), *_of_arm(fit)))
+
+
+def of_instruments_alone(fit: Fit) -> Iterator[tuple[Cause, Columns]]:
+    """The causes of instruments that there may be in this fit, and their columns."""
+    yield from _with_columns(fit, _of_instruments(fit))
+
+
+def _with_columns(fit: Fit, several: Iterable[Cause]) -> Iterator[tuple[Cause, Columns]]:
+    for cause in several:
         columns = cause.columns(fit)
         if columns is not None:
             yield cause, columns

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from pkmcal.diagnostics.cause_columns import possible, usable
+from pkmcal.diagnostics.cause_columns import Cause, of_instruments_alone, possible, usable
 from pkmcal.diagnostics.check import Check, Level
 from pkmcal.display import chance_text
+from pkmcal.fitted.fit import Fit
 from pkmcal.fitted.solution import Solution
 from pkmcal.statistics.causes import causes
+from pkmcal.statistics.score_test import Columns
 
 CHANCE = 0.05  # of naming any cause of a sound machine
 SURE = 0.01  # below which one that moves the numbers makes a result doubtful
 HARMFUL = 1.0  # standard deviations, rms over the parameters
 _MOST = 3  # that are named
+_CERTAIN = 1e-4  # chance below which a cause is named of a fit that is none
 _FEW = 10.0  # degrees of freedom below which residuals tell no causes apart
 
 
@@ -47,11 +51,24 @@ class FoundCause:
 
 def found_causes(found: Solution) -> tuple[FoundCause, ...]:
     """Test all causes, the one that explains most first."""
+    return _explained(found, possible)
+
+
+def _of_instruments(found: Solution) -> tuple[FoundCause, ...]:
+    """Numbers of an instrument that would explain what a fit leaves that is no fit."""
+    sure = _explained(found, of_instruments_alone)
+    return tuple(each for each in sure[:1] if each.chance < _CERTAIN)
+
+
+def _explained(
+    found: Solution, possible: Callable[[Fit], Iterator[tuple[Cause, Columns]]]
+) -> tuple[FoundCause, ...]:
+    """Test causes, the one that explains most first."""
     sure = found.fit.uncertainty
-    if sure.rounded or not usable(found.fit.estimate.evaluation) or sure.fit.freedom < _FEW:
+    if sure.rounded or not usable(found.fit.estimate.evaluation) or sure.tested.freedom < _FEW:
         return ()
     pairs = list(possible(found.fit))
-    every = causes(sure.fit, [columns for _, columns in pairs], CHANCE, _MOST)
+    every = causes(sure.tested, [columns for _, columns in pairs], CHANCE, _MOST)
     return tuple(
         FoundCause(
             pairs[each.cause][0].name,
@@ -83,5 +100,9 @@ CHECKS = (
         name="causes", about="a cause that is not in the model would explain residuals",
         levels=("doubt", "remark"), level_of=_level, run=found_causes, say=_text,
         unless=("grave", "sag-lacking", "follows-loads"),
+    ),
+    Check(
+        name="instrument", about="a lens or a board that is not as stated would explain a bad fit",
+        levels=("doubt",), run=_of_instruments, say=_text, unless=("causes",),
     ),
 )  # fmt: skip

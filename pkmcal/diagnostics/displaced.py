@@ -83,7 +83,7 @@ def displaced_target(fit: Fit) -> DisplacedTarget | None:
     targets = dict(_targets(fit))
     if len(targets) < 2:
         return None
-    tested = {name: score_test(sure.fit, _columns(fit, rows)) for name, rows in targets.items()}
+    tested = {name: score_test(sure.tested, _columns(fit, rows)) for name, rows in targets.items()}
     known = {name: score for name, score in tested.items() if score is not None}
     if not known:
         return None
@@ -95,14 +95,14 @@ def displaced_target(fit: Fit) -> DisplacedTarget | None:
         stderr=tuple(best.deviation.tolist()),
         chance=min(1.0, len(known) * best.chance),
         share=_share(sure, best.explained),
-        also=tuple(_alike(known, name, (sure.fit.squares - best.drop) / sure.fit.freedom)),
+        also=tuple(_alike(known, name, (sure.tested.squares - best.drop) / sure.tested.freedom)),
     )
 
 
 def _share(sure: Uncertainty, explained: FloatArray) -> float:
     """Share of the squared lengths that is explained."""
     lengths = sure.labels.length
-    before = sure.in_units(sure.fit.residual)[lengths]
+    before = sure.in_units(sure.tested.residual)[lengths]
     after = before - sure.in_units(explained)[lengths]
     return 1.0 - float(after @ after) / float(before @ before)
 

@@ -48,7 +48,10 @@ def _elsewhere(found: Solution) -> tuple[PosesElsewhere, ...]:
     if not len(odd):
         return ()
     rows = equations.table.rows[np.isin(equations.blocks.block_of_row, odd)].tolist()
-    return (PosesElsewhere(_ratio(found.fit, rows), len(odd), tuple(rows)),)
+    ratio = _ratio(found.fit, rows)
+    if ratio <= 1.0:  # without them the others scatter no less
+        return ()
+    return (PosesElsewhere(ratio, len(odd), tuple(rows)),)
 
 
 def _ratio(fit: Fit, rows: Sequence[int]) -> float:

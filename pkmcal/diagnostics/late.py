@@ -79,7 +79,7 @@ def late(found: Solution) -> Late | None:
         return None
     visits = visits_of(found)
     tested = {
-        leaving: beside(sure.fit, _columns(found, place))
+        leaving: beside(sure.tested, _columns(found, place))
         for leaving, place in ((False, visits.before), (True, visits.after))
     }
     ways = {leaving: each for leaving, each in tested.items() if each is not None}

@@ -195,8 +195,8 @@ def _visits(fit: Fit, odd: Collection[int]) -> _Visits:
         row=equations.table.rows[first],
         place=first,
         visit=visit[labels.row][mine][where],
-        design=averaged(sure.fit.design),
-        residual=averaged(sure.fit.residual[:, None])[:, 0],
+        design=averaged(sure.tested.design),
+        residual=averaged(sure.tested.residual[:, None])[:, 0],
         by_component=averaged(_by_component(fit)),
     )
 

@@ -11,9 +11,9 @@ from pkmcal.fitted.solution import Solution
 from pkmcal.readings.reading import Reading
 from pkmcal.statistics.covariance import spare
 from pkmcal.statistics.distributions import chi2_tail, deviation_interval
-from pkmcal.statistics.holdout_test import CHANCE
 
 NOISY = 9.0  # chi²/dof that a slip in sigma does not explain
+_CHANCE = 0.01  # of residuals so small, if sigma is right
 _SMALL, _LARGE = 0.5, 1.5  # times sigma, below and above which residuals are worth a word
 _CAUCHY = Remedy("loss", "cauchy")
 
@@ -155,7 +155,7 @@ def _too_quiet(found: Solution) -> tuple[float, ...]:
     if not _stated(found) or found.loss != "linear":
         return ()
     squares, freedom = spare(found.fit.uncertainty.fit)
-    if not chi2_tail(squares, freedom) > 1.0 - CHANCE:
+    if not chi2_tail(squares, freedom) > 1.0 - _CHANCE:
         return ()
     ratio = float(np.sqrt(squares / freedom))
     return at_most_one(ratio if ratio < _SMALL else None)

@@ -11,9 +11,10 @@ from pkmcal.diagnostics.check import Check, Remedy, at_most_one
 from pkmcal.display import chance_text
 from pkmcal.fitted.solution import Solution
 from pkmcal.statistics.distributions import t_tail
-from pkmcal.statistics.prior_test import CONTRADICTED, PriorTest
+from pkmcal.statistics.prior_test import PriorTest
 
 _PULLED = 2.0  # times what is expected, from which a pull on a prior is worth a word
+_WRONG = 0.005  # chance below which an uncertainty is stated wrongly
 
 
 def _contradicted(found: Solution) -> tuple[PriorTest, ...]:
@@ -66,11 +67,12 @@ def _uncertainty_contradicted(found: Solution) -> tuple[WrongUncertainty, ...]:
     judged = [each for each in found.nuisances if np.isfinite(each.pull)]
     if test is None or not judged:
         return ()
-    chances = [2.0 * len(judged) * t_tail(abs(each.pull), np.inf) for each in judged]
-    far = [each for each, own in zip(judged, chances, strict=True) if own < CONTRADICTED]
+    tests = 2.0 * len(judged)  # of each, and of all together
+    chances = [tests * t_tail(abs(each.pull), test.freedom) for each in judged]
+    far = [each for each, own in zip(judged, chances, strict=True) if own < _WRONG]
     far.sort(key=lambda each: -abs(each.pull))
     chance = min(1.0, 2.0 * test.chance, *chances)
-    if chance >= CONTRADICTED:
+    if chance >= _WRONG:
         return ()
     names, pulls = tuple(e.name for e in far), tuple(abs(e.pull) for e in far)
     return (WrongUncertainty(names, pulls, chance, test.factor),)

@@ -70,9 +70,9 @@ def cross_validations(found: Solution) -> tuple[CrossValidation, ...]:
         session = np.unique(np.concatenate(known), return_inverse=True)[1]
         if session.max() > 0:
             blocks["sessions"] = session[row]
-    by_pose = residuals_left_out(sure.fit, numbered(pose))
+    by_pose = residuals_left_out(sure.tested, numbered(pose))
     at_random = _rms(fit, by_pose)
-    tested = {name: left_out(sure.fit, block) for name, block in blocks.items()}
+    tested = {name: left_out(sure.tested, block) for name, block in blocks.items()}
     return tuple(
         CrossValidation(name, _rms(fit, each.residual), at_random, each.ratio, each.chance)
         for name, each in tested.items()

@@ -14,7 +14,6 @@ from pkmcal.exceptions import ArgumentError
 from pkmcal.fitted.fit import Fit
 from pkmcal.fitted.left_out import Comparison, compared_by_poses, effect_columns
 from pkmcal.fitted.solution import Solution
-from pkmcal.kinematics.arm_machine import ArmMachine
 from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.statistics.causes import causes
 from pkmcal.statistics.score_test import Columns
@@ -63,7 +62,7 @@ def sag_that_helps(fit: Fit) -> SagFinding | None:
     better of both: main joints that explain nothing alone may do so with the others.
     """
     machine = fit.parameters.robot
-    if not isinstance(machine, ArmMachine):
+    if machine.kind != "arm":
         return None
     found, before = None, {*fit.parameters.names}
     for effect in (Sag("main"), Sag("all")):
@@ -115,7 +114,9 @@ def _alike(fit: Fit, sag: Columns) -> Harmonics | None:
         (each, effect_columns(fit, [each.of_machine(machine)])) for each in waves_a_turn(machine)
     ]
     there = [(each, columns) for each, columns in by_wave if columns is not None]
-    (best, *_) = causes(fit.uncertainty.fit, [sag, *(own for _, own in there)], SURE, 1) or (None,)
+    (best, *_) = causes(fit.uncertainty.tested, [sag, *(own for _, own in there)], SURE, 1) or (
+        None,
+    )
     if best is None or best.cause == 0 or 0 not in best.also:
         return None
     return there[best.cause - 1][0]

@@ -26,11 +26,13 @@ from pkmcal.estimation.parameters import Asked, Bounds, Parameters
 from pkmcal.estimation.prior_functions import is_function, prior_functions
 from pkmcal.estimation.scales import unit_scales
 from pkmcal.estimation.sessions import Scope, label, matches, scopes
-from pkmcal.estimation.uncertain_numbers import spread, uncertain_names
+from pkmcal.estimation.uncertain_numbers import own_deviations, spread, uncertain_names
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.geometry.elastic import is_kinematic
 from pkmcal.geometry.stated_uncertainty import LEAST, MOST
 from pkmcal.kinematics.calibratable import Calibratable
+
+_EXACT = 1e-7  # mm that a number moves the machine by: what is stated to be less is exact as well
 
 
 def parameters(
@@ -66,16 +68,17 @@ def parameters(
     scope = scopes(numbers, blocks, asked.per_session, asked.by_set)
     entries = _entries(len(places), scope, blocks, datasets, asked.held_points)
     fitted_along = {*range(len(free), len(places))}
-    for (role, _), block in blocks.items():
-        if role in asked.uncertain_roles:
+    beside_known = set[int]()
+    for point, block in blocks.items():
+        if point[0] in asked.uncertain_roles:
             fitted_along |= {*range(block.start, block.stop)}
-    entries = _without_exact(entries, numbers, fitted_along, asked)
+        if beside[point].spread is not None:
+            beside_known |= {*range(block.start, block.stop)}
+    entries = _without_exact(entries, numbers, fitted_along - beside_known, asked)
+    fitted_along |= beside_known
     number_of = np.array([number for number, _ in entries], dtype=np.intp)
     names = tuple(numbers[j] + (f"@{behind}" if behind else "") for j, behind in entries)
     uncertain = np.isin(number_of, sorted(fitted_along))
-    of_uncertain = spread(
-        asked.uncertainty, [n for n, own in zip(names, uncertain, strict=True) if own]
-    )
     units_of = geometry.units
     every = [units_of[i] for i in places.tolist()]
     every += [unit for each in beside.values() for unit in each.units]
@@ -90,6 +93,13 @@ def parameters(
     ]
     of_unit = unit_scales(robot, [data.measured for data in datasets])
     scale = _scales(np.concatenate(of_number)[number_of], of_unit, names, units, like)
+    along = [n for n, own in zip(names, uncertain, strict=True) if own]
+    least = _EXACT * scale[uncertain]
+    small = own_deviations(asked.uncertainty, along) < least
+    of_uncertain = spread(asked.uncertainty, along) + np.diag(np.where(small, least, 0.0) ** 2)
+    along_entries = [entry for entry, own in zip(entries, uncertain, strict=True) if own]
+    for point, block in blocks.items():
+        _add_known(of_uncertain, along_entries, block, beside[point].spread)
     starts = [geometry.values[places], *(each.start for each in beside.values())]
     values = np.concatenate(starts)[number_of]
     count = int(np.count_nonzero(number_of < len(places)))
@@ -127,6 +137,24 @@ def parameters(
     columns = {session: made.geometry_of(session) for session in made.sessions or ("",)}
     given = (asked.prior, robot, start, places, columns)
     return replace(made, functions=prior_functions(*given, strict=like is None))
+
+
+def _add_known(
+    spread: FloatArray,
+    entries: Sequence[tuple[int, str]],
+    block: slice,
+    known: FloatArray | None,
+) -> None:
+    """Add what a reading itself knows of numbers to the covariance of uncertain ones (u, u)."""
+    if known is None:
+        return
+    for behind in dict.fromkeys(behind for _, behind in entries):
+        mine = [
+            i for i, (j, own) in enumerate(entries)
+            if own == behind and block.start <= j < block.stop
+        ]  # fmt: skip
+        slots = [entries[i][0] - block.start for i in mine]
+        spread[np.ix_(mine, mine)] += known[np.ix_(slots, slots)]
 
 
 def _refuse_twice(names: Sequence[str]) -> None:

@@ -50,7 +50,7 @@ def uncertain_names(
 
 def spread(stated: StatedUncertainty, names: Sequence[str]) -> FloatArray:
     """Covariance (u, u) of the errors of numbers by their names, mm, rad and 1."""
-    own = np.array([_last(stated.own, name)[1] for name in names]).reshape(len(names))
+    own = own_deviations(stated, names)
     shared = np.zeros((len(names), len(names)))
     groups: dict[tuple[str, str], list[int]] = {}
     common = np.zeros(len(names))
@@ -65,6 +65,11 @@ def spread(stated: StatedUncertainty, names: Sequence[str]) -> FloatArray:
     own = np.where((own == 0.0) & (common > 0.0), _ALIKE * common, own)
     found: FloatArray = np.diag(own**2) + shared
     return found
+
+
+def own_deviations(stated: StatedUncertainty, names: Sequence[str]) -> FloatArray:
+    """Deviations (u,) of numbers by themselves, without what they have in common."""
+    return np.array([_last(stated.own, name)[1] for name in names]).reshape(len(names))
 
 
 def inverse_root(covariance: FloatArray) -> FloatArray:

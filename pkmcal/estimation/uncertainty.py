@@ -21,6 +21,7 @@ from pkmcal.statistics.covariance import Covariance, CovarianceRule, covariance
 from pkmcal.statistics.linear_fit import (
     LinearFit,
     in_unit_basis,
+    met_exactly,
     numbered,
     reweighted,
     unit_basis,
@@ -77,6 +78,8 @@ class Uncertainty:
         How the basis follows numbers that are not fitted along, in their stated deviations.
     noise_share : float
         Of the residuals' variance, what these numbers do not explain.
+    allowed : (LinearFit, ndarray) or None
+        The fit with these numbers fitted along, and residuals of its prior's rows.
     """
 
     labels: Labels
@@ -93,6 +96,7 @@ class Uncertainty:
     information: FloatArray
     considered: FloatArray | None = None
     noise_share: float = 1.0
+    allowed: tuple[LinearFit, FloatArray] | None = None
 
     @property
     def known(self) -> bool:
@@ -133,16 +137,22 @@ class Uncertainty:
         """Covariance (n, n) of the scaled parameters."""
         return self.covariance.of(self.fit.back) + self._beside(self.fit.back)
 
+    @property
+    def tested(self) -> LinearFit:
+        """The fit for tests of the model: without what considered numbers explain of residuals."""
+        return self.fit if self.allowed is None else self.allowed[0]
+
     @cached_property
     def of_own_deviations(self) -> LinearFit:
-        """The fit with each component in units of its own deviation.
+        """The tested fit with each component in units of its own deviation.
 
         Where a stated sigma is right for some of the components and too small for others, tests of
         the linear model take what these miss for what they look for.
         """
         if self.mixed or self.equations.blocks.unstated.all():
-            return self.fit  # where none is stated, they have their own already
-        return _of_own_deviations(self.fit, self.labels, self._place, self.prior_residual)
+            return self.tested  # where none is stated, they have their own already
+        beyond = self.prior_residual if self.allowed is None else self.allowed[1]
+        return _of_own_deviations(self.tested, self.labels, self._place, beyond)
 
     def _beside(self, contrasts: FloatArray) -> FloatArray | float:
         """Return the covariance of contrasts (q, p) by offsets and numbers not fitted."""
@@ -185,6 +195,18 @@ class Uncertainty:
         matrix: FloatArray = self.covariance.by_cluster * self.noise_share + prior
         return matrix
 
+    @cached_property
+    def by_rule(self) -> FloatArray:
+        """Covariance (p, p) in the basis by the rule that ± have.
+
+        The sandwich of few poses is a rough estimate: tests by it find too much.
+        """
+        if self.covariance.rule == "cluster":
+            return self.by_cluster
+        prior = self.fit.prior.T @ self.fit.prior
+        matrix: FloatArray = self.covariance.of(np.eye(len(prior)))
+        return matrix
+
     def in_units(self, whitened: FloatArray) -> FloatArray:
         """Whitened values (M,) in mm, angles as their arcs."""
         parts = self.equations.whitening.unwhiten(whitened, self.factors)
@@ -201,6 +223,21 @@ class Uncertainty:
         """Equations (M,) of set `i` that are lengths."""
         chosen: BoolArray = self.labels.length & (self.labels.set_of == i)
         return chosen
+
+    @cached_property
+    def idle(self) -> BoolArray:
+        """Equations (M,) of components that are met exactly, such as the height of a plane."""
+        if self.mixed:
+            return np.zeros(len(self.fit.residual), dtype=bool)
+        return met_exactly(self.fit.residual, self.fit.component)
+
+    def noise_of_moving(self, i: int, family: int = 0) -> float:
+        """Variance of `noise_of` of the equations that are not idle."""
+        total = self.noise_of(i, family)[0]
+        if not self.idle.any():
+            return total
+        mine = self.family_of(i, family) if family else self.lengths_of(i)
+        return total / ((1.0 - float(self.idle[mine].mean())) or 1.0)
 
     def family_of(self, i: int, family: int) -> BoolArray:
         """Equations (M,) of one family of set `i`, by its number there."""

@@ -64,6 +64,8 @@ class Column:
         The marks of decimals in its file, each with a cell that can be read in no other way.
     stated : mapping of str to (str, int)
         Units that its file states for all columns, of "mm" and "rad", with their lines.
+    also : bool
+        Whether it is a second reading of a column that is listed already.
     """
 
     name: str
@@ -75,6 +77,7 @@ class Column:
     decimal_comma: bool
     decimals: Mapping[str, str]
     stated: Mapping[str, tuple[str, int]]
+    also: bool = False
 
     def take(self, rows: Sequence[int]) -> Column:
         """The cells of these rows."""
@@ -229,7 +232,7 @@ class Table:
 
     def understood(self) -> tuple[Understood, ...]:
         """List the meaning of each column: those that are read, then those that are left out."""
-        read = [(name, each) for name, each in self.columns.items()]
+        read = [(name, each) for name, each in self.columns.items() if not each.also]
         found = []
         for meaning, column in [*read, *((None, each) for each in self._forgotten)]:
             unit, stated = self._units_taken.get(meaning or "", (None, ""))

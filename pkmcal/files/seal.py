@@ -1,7 +1,7 @@
 """A file that states the SHA-256 of the rest of itself: whether it is as it was written.
 
 What has no seal, or another content than it states, is somebody's work. The seal stands where the
-format has room for a remark: a comment of CSV, TOML, HTML, SVG, XML, URDF, C, ini and hal files,
+format has room for a remark: a comment of CSV, TOML, YAML, HTML, SVG, XML, URDF, C, ini and hal files,
 the first key of JSON, a text chunk before the end of PNG, a comment at the end of PDF. Other files,
 a printer's configuration and G-code among them, are their owner's and have no seal.
 """
@@ -60,6 +60,7 @@ _FORMS = {
     ".csv": _Form(_line, after=0),
     ".toml": _Form(_line, after=0),
     ".ini": _Form(_line, after=0),
+    ".yaml": _Form(_line, after=len("%YAML:1.0\n---\n")),
     ".hal": _Form(_line, after=0),
     ".h": _Form(_remark_in_c, after=0),
     ".c": _Form(_remark_in_c, after=0),

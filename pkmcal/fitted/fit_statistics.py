@@ -22,7 +22,7 @@ from pkmcal.estimation.mirror import MIRROR, mirror_fits
 from pkmcal.estimation.uncertainty import Uncertainty
 from pkmcal.fitted.distances import distances
 from pkmcal.fitted.dropped import outlying
-from pkmcal.fitted.nuisances import in_result, nuisances
+from pkmcal.fitted.nuisances import CHECKED, in_result, nuisances
 from pkmcal.statistics.distributions import t_factor
 from pkmcal.statistics.linear_fit import triangle
 from pkmcal.statistics.prior_test import LEAST_FREEDOM, PriorTest, left_alone, prior_test
@@ -217,4 +217,5 @@ def tested_prior(
         ]
     factor = triangle(columns)
     k = len(rows)
-    return prior_test(factor[:, :k], factor[:, k:-1], factor[:, -1], variance, freedom)
+    least = CHECKED if of_uncertain else 0.0
+    return prior_test(factor[:, :k], factor[:, k:-1], factor[:, -1], variance, freedom, least)

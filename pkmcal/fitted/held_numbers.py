@@ -13,11 +13,14 @@ from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.free_parameters import parameters
 from pkmcal.estimation.parameters import Parameters
+from pkmcal.estimation.sessions import matches
 from pkmcal.estimation.uncertain_numbers import spread, uncertain_names, uncertain_sets
 from pkmcal.estimation.uncertainty import Uncertainty
 from pkmcal.exceptions import ArgumentError
 from pkmcal.fitted.later import Later
+from pkmcal.fitted.nuisances import bound
 from pkmcal.geometry.stated_uncertainty import StatedUncertainty
+from pkmcal.statistics.linear_fit import allowing
 from pkmcal.statistics.score_test import Columns
 
 _LEAST_NOISE = 0.25  # of the residuals' variance, that is noise whatever numbers are considered
@@ -63,12 +66,55 @@ def held_numbers(
     stated : StatedUncertainty
         Which numbers, and their deviations.
     """
-    fitted, chosen = sure.equations, sure.equations.parameters
-    wide = beside(chosen, fitted.prediction.datasets, stated)
+    fitted = sure.equations
+    wide = beside(fitted.parameters, fitted.prediction.datasets, stated)
     if wide is None:
         return None
-    sets, more = wide
-    new = [i for i, name in enumerate(more.names) if name not in chosen.names]
+    known = fitted.parameters.names
+    return _held(sure, end, *wide, [name for name in wide[1].names if name not in known])
+
+
+def bound_numbers(
+    sure: Uncertainty, end: Evaluation, stated: StatedUncertainty
+) -> HeldNumbers | None:
+    """The numbers that a statement names and that are where they are whatever was measured.
+
+    Those that the fit has not, those that `fix` holds, and those that were fitted along and that
+    their statement binds: see `bound`.
+    """
+    fitted = sure.equations
+    chosen = fitted.parameters
+    along_bound = bound_names(sure, end)
+    geometry = chosen.robot.geometry
+    free = [geometry.names[place] for place in chosen.places]
+    along = {name for name, own in zip(chosen.names, chosen.uncertain, strict=True) if own}
+    asked = replace(chosen.asked, free=[name for name in free if name not in along], fix=())
+    wide = beside(replace(chosen, asked=asked), fitted.prediction.datasets, stated)
+    sets, more = (list(fitted.prediction.datasets), chosen) if wide is None else wide
+    named = [
+        name
+        for name in more.names
+        if name not in chosen.names
+        or (name in along_bound and any(matches(pattern, name) for pattern in stated.patterns))
+    ]
+    return _held(sure, end, sets, more, named) if named else None
+
+
+def bound_names(sure: Uncertainty, end: Evaluation) -> frozenset[str]:
+    """Numbers that were fitted along, and that their statement binds: see `bound`."""
+    chosen = sure.equations.parameters
+    if not chosen.uncertain.any():
+        return frozenset()
+    back = chosen.scale[:, None] * sure.fit.back
+    along = np.flatnonzero(chosen.uncertain)[bound(chosen, end.theta, back @ back.T)]
+    return frozenset(chosen.names[i] for i in along)
+
+
+def _held(
+    sure: Uncertainty, end: Evaluation, sets: list[FitData], more: Parameters, names: list[str]
+) -> HeldNumbers:
+    fitted, chosen = sure.equations, sure.equations.parameters
+    new = [more.names.index(name) for name in names]
 
     def columns() -> Iterator[tuple[slice, FloatArray]]:
         equations = Equations.of(sets, more).reweighted(fitted.whitening.deviations)
@@ -79,10 +125,7 @@ def held_numbers(
 
     mine = np.isin(np.flatnonzero(more.uncertain), new)
     return HeldNumbers(
-        tuple(more.names[i] for i in new),
-        tuple(more.units[i] for i in new),
-        columns,
-        more.spread[np.ix_(mine, mine)],
+        tuple(names), tuple(more.units[i] for i in new), columns, more.spread[np.ix_(mine, mine)]
     )
 
 
@@ -117,7 +160,10 @@ def with_considered(sure: Uncertainty, end: Evaluation, stated: StatedUncertaint
     covariance = sure.covariance
     if np.isfinite(covariance.scale_freedom):
         covariance = replace(covariance, scale=covariance.scale * float(np.sqrt(share)))
-    return replace(sure, considered=follow, covariance=covariance, noise_share=share)
+    allowed = allowing(sure.fit, columns, float(np.sqrt(share)), sure.prior_residual)
+    return replace(
+        sure, considered=follow, covariance=covariance, noise_share=share, allowed=allowed
+    )
 
 
 def considered_places(chosen: Parameters) -> tuple[IntArray, FloatArray]:

@@ -24,12 +24,12 @@ from pkmcal.measurements.measurements import Measurements
 from pkmcal.readings.reading import Family
 from pkmcal.statistics.distributions import f_tail
 from pkmcal.statistics.holdout_test import RATIO, HoldoutTest, Lengths, holdout_test
-from pkmcal.statistics.linear_fit import numbered
+from pkmcal.statistics.linear_fit import met_exactly, numbered
 from pkmcal.statistics.noise import Noise, noise
 
 _NOTHING = 1e-6  # share of a variance below which nothing is left of a reading
 _HUGE = 1e300
-_ODD = 0.01  # chance of naming any held-out row that is as far off as expected
+_ODD = 0.005  # chance of naming any held-out row that is as far off as expected
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,8 +71,9 @@ class Points:
     Residuals and design, what considered numbers make of them, the variance of a reading and of
     what actuators add to it in mm² and by which of them (M, n), the square roots of the parts with
     their signs, the share of each that numbers of its own session took, the
-    number of its unit, the fitted set that each is like and the number of its family there; and
-    the units. Variances are NaN where the fit shows none of that family.
+    number of its unit, the fitted set that each is like and the number of its family there, whether
+    it is of a component that is met exactly; and the units. Variances are NaN where the fit shows
+    none of that family, 0 of what is met exactly.
     """
 
     residual: FloatArray
@@ -86,6 +87,7 @@ class Points:
     like: IntArray
     family: IntArray
     arc: FloatArray
+    idle: BoolArray
     units: tuple[str, ...]
 
     @property
@@ -95,8 +97,8 @@ class Points:
 
     @property
     def known(self) -> BoolArray:
-        """Mask of equations of known noise."""
-        return np.isfinite(self.reading)
+        """Mask of equations of known noise, without those that are met exactly."""
+        return np.isfinite(self.reading) & ~self.idle
 
     def by_fit(self, uncertainty: Uncertainty) -> FloatArray:
         """Variance that the parameters' errors add."""
@@ -108,7 +110,7 @@ class Points:
 
     def whole(self, uncertainty: Uncertainty) -> tuple[FloatArray, FloatArray]:
         """Design (M, p + k) of all that makes an error, and the covariance of that."""
-        k, matrix = self.considered.shape[1], uncertainty.by_cluster
+        k, matrix = self.considered.shape[1], uncertainty.by_rule
         if not k:
             return self.design, matrix
         covariance = np.eye(len(matrix) + k)
@@ -163,11 +165,13 @@ def points(
             weighted += by_sigma / uncertainty.excess[0]
         taken = np.clip(((by_own @ own.half) ** 2).sum(axis=1) / weighted, 0.0, 1.0)
     units = tuple(dict.fromkeys(unit for m in equations.table.sets for unit in m.units))
+    residual = stacked([a * part for a, part in zip(arcs, after.residuals, strict=True)])
+    idle = met_exactly(residual, named.component) & bool(uncertainty.idle.any())
     return Points(
-        residual=stacked([a * part for a, part in zip(arcs, after.residuals, strict=True)]),
+        residual=residual,
         design=by_fitted @ back,
         considered=considered_errors(rows, equations, after, uncertainty, by_fitted @ back),
-        reading=stacked(variances),
+        reading=np.where(idle, 0.0, stacked(variances)),
         by_actuators=by_sigma,
         by_actuator=by_each,
         taken=taken,
@@ -177,6 +181,7 @@ def points(
         like=np.array(rows.like)[named.set_of],
         family=np.concatenate(families)[present],
         arc=arc,
+        idle=idle,
         units=units,
     )
 
@@ -203,7 +208,7 @@ def _variances(
     """Variance of a component of each row, mm² (N,): that of the fitted set, by sigma if stated."""
     if there < 0:
         return np.full(len(measured), np.nan)
-    total = uncertainty.noise_of(like, there)[0]
+    total = uncertainty.noise_of_moving(like, there)
     own = stated_variances(measured, family)
     fitted = stated_variances(uncertainty.equations.table.sets[like], there)
     if own is None or fitted is None:
@@ -358,8 +363,8 @@ def _fitted(uncertainty: Uncertainty, sets: IntArray, family: IntArray) -> tuple
     else:
         values = uncertainty.adjusted
         for i, there in sorted(set(zip(sets.tolist(), family.tolist(), strict=True))):
-            unit[uncertainty.family_of(i, there)] = np.sqrt(uncertainty.noise_of(i, there)[0])
-    mine = unit > 0
+            unit[uncertainty.family_of(i, there)] = np.sqrt(uncertainty.noise_of_moving(i, there))
+    mine = (unit > 0) & ~uncertainty.idle
     residual = values[mine] / unit[mine]
     split = noise(residual, sandwich.retained[mine], numbered(uncertainty.fit.key[mine]))
     lengths = Lengths(

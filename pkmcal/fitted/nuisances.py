@@ -8,9 +8,11 @@ import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray
 from pkmcal.estimation.parameters import Parameters
+from pkmcal.estimation.uncertain_numbers import own_deviations
 
 _MOVED = 2.0  # times its stated deviation, from which such a number is part of the result
-_CHECKED = 0.1  # share of its deviation by which measurements must move it to be judged
+_FAR = 4.0  # times what its statement lets expect, from which a number is bound by it
+CHECKED = 0.1  # share of its deviation by which measurements must move it to be judged
 
 
 @dataclass(frozen=True)
@@ -65,7 +67,7 @@ def nuisances(
     left = np.diagonal(covariance)[mine]
     stated = np.diagonal(chosen.spread)
     expected = stated - left  # of the change, for the rest is what is not known of it
-    judged = expected > _CHECKED**2 * stated
+    judged = expected > CHECKED**2 * stated
     pulls = np.where(judged, change / np.sqrt(np.where(judged, expected, 1.0)), np.nan)
     start = chosen.reported(chosen.start)
     return tuple(
@@ -80,6 +82,31 @@ def nuisances(
         )
         for k, i in enumerate(mine)
     )
+
+
+def bound(chosen: Parameters, theta: FloatArray, covariance: FloatArray) -> BoolArray:
+    """Mark numbers (u,) that were fitted along and that their statement binds.
+
+    Where a number has no deviation of its own but a common one, or so small a one that no reading
+    moves it by a tenth of it, it is held as it is, whatever is stated: a check of the statement
+    says nothing of it. Where it is far from where its statement has it, the measurements would have
+    it still further.
+
+    Parameters
+    ----------
+    chosen : Parameters
+        All parameters.
+    theta, covariance : ndarray (n,), (n, n)
+        As of `nuisances`.
+    """
+    mine = np.flatnonzero(chosen.uncertain)
+    own = own_deviations(chosen.asked.uncertainty, [chosen.names[i] for i in mine])
+    expected = chosen.spread - covariance[np.ix_(mine, mine)]  # of the changes
+    by_own = np.asarray(np.linalg.solve(chosen.spread, np.diag(own)), dtype=np.float64)
+    change = (theta - chosen.start)[mine] @ by_own  # of the own parts, in their deviations
+    variance = np.einsum("ik,ij,jk->k", by_own, expected, by_own)
+    found: BoolArray = (variance <= CHECKED**2) | (change**2 > _FAR**2 * variance)
+    return found
 
 
 def in_result(chosen: Parameters, beside: tuple[Nuisance, ...]) -> BoolArray:

@@ -30,7 +30,7 @@ def row_names(datasets: Sequence[FitData], rows: Iterable[int]) -> str:
         group = data.measured.group
         if group is not None and (count := whole[id(data), int(group[i])]) > _MOST:
             file = f" of {printable(data.measured.file)}" if data.measured.file else ""
-            places.setdefault(f"pose {group[i]}{file} ({count} rows)", [])
+            places.setdefault(f"pose {pose_name(data, i)}{file} ({count} rows)", [])
             continue
         targets = places.setdefault(_place(data, i), [])
         targets += _target(data, i)
@@ -54,7 +54,15 @@ def _place(data: FitData, i: int) -> str:
     if measured.lines is not None:
         file = f"{printable(measured.file)} " if measured.file else ""
         place = f"{file}line {measured.lines[i]}"
-    return place if measured.group is None else f"{place}, pose {measured.group[i]}"
+    return place if measured.group is None else f"{place}, pose {pose_name(data, i)}"
+
+
+def pose_name(data: FitData, i: int) -> str:
+    """Name the pose of the row in place `i` of a set that has groups, by its number at least."""
+    measured = data.measured
+    if measured.pose_name is not None:
+        return printable(measured.pose_name[i])
+    return str(measured.group[i])
 
 
 def _target(data: FitData, i: int) -> list[str]:

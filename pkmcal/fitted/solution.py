@@ -31,7 +31,7 @@ else:
 _NAMES = (  # of `to_dict`, in the order in which they are written
     "verdict", "robot", "free", "units", "values", "start", "stderr", "parameter_dof", "interval95",
     "covariance", "covariance_rule", "rank", "gap", "datum", "expansion", "unidentifiable",
-    "nuisances", "gauges", "rms", "rms_before", "holdout_rms", "holdout_rms_before",
+    "nuisances", "breakeven", "gauges", "rms", "rms_before", "holdout_rms", "holdout_rms_before",
     "holdout_expected", "holdout_contradicts", "holdout_chance", "holdout_outliers",
     "holdout_unreached", "holdout_off",
     "holdout_off_before", "closure_rms", "closure_rms_before", "chi2_per_dof", "dof", "noise",

@@ -30,7 +30,7 @@ from pkmcal.jobs.geometry_options import (
     read_uncertainty,
 )
 from pkmcal.jobs.inputs import Inputs
-from pkmcal.jobs.read_files import read_files, rows_to_drop, without_lines
+from pkmcal.jobs.read_files import read_files, read_pnp, rows_to_drop, without_lines
 from pkmcal.jobs.sessions import in_sessions
 from pkmcal.kinematics.calibratable import Calibratable, as_machine
 from pkmcal.kinematics.robot import Robot
@@ -60,6 +60,9 @@ class Sources:
         Those of a file that is held out.
     doubts : tuple of str
         Warnings of reading.
+    relative : bool
+        Whether their sigma says how sure rows are beside each other alone: how sure they are in all
+        is to be estimated.
     """
 
     robot: Robot | SerialArm
@@ -67,6 +70,7 @@ class Sources:
     file_of: tuple[int, ...]
     held: Measurements | None
     doubts: tuple[str, ...]
+    relative: bool = False
 
 
 def run(job: Calibration, inputs: Inputs, tell: Tell) -> Identification:
@@ -106,14 +110,36 @@ def read(job: Calibration, inputs: Inputs, tell: Tell) -> Sources:
         held = found[0]
     measured = tuple(each for of_file in several for each in of_file)
     file_of = tuple(k for k, of_file in enumerate(several) for _ in of_file)
-    return Sources(robot, measured, file_of, held, doubts)
+    pnp = job.reading.from_pnp
+    return Sources(
+        robot, measured, file_of, held, doubts, pnp is not None and read_pnp(pnp).noise is None
+    )
 
 
 def identified(sources: Sources, arguments: dict[str, Any]) -> Identification:
     """Identify; what `identify` warns of is in the summary."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)
-        return identify(sources.robot, **arguments)
+        found = identify(sources.robot, **arguments)
+        noise = found.chi2_per_dof**0.5
+        if not sources.relative or not (math.isfinite(noise) and noise > 0.0):
+            return found
+        return identify(sources.robot, **_with_noise(arguments, noise))
+
+
+def _with_noise(arguments: dict[str, Any], noise: float) -> dict[str, Any]:
+    """Arguments of `identify` with covariances of what was measured times noise squared."""
+
+    def scaled(measured: Measurements) -> Measurements:
+        assert measured.sigma is not None
+        return replace(measured, sigma=measured.sigma * noise**2)
+
+    measured, held = arguments["measurements"], arguments["holdout"]
+    several = [measured] if isinstance(measured, Measurements) else measured
+    return arguments | {
+        "measurements": [scaled(each) for each in several],
+        "holdout": scaled(held) if isinstance(held, Measurements) else held,
+    }
 
 
 def arguments(job: Calibration, sources: Sources, tell: Tell) -> dict[str, Any]:
@@ -203,9 +229,12 @@ def _anew(job: Calibration) -> list[str]:
 
 def _unknown(job: Calibration, sources: Sources) -> dict[Role, Known | list[Known]]:
     """Return the unknowns by ``--frame``, ``--target`` and ``--attachment``, for each file."""
+    frame, target = job.frame, job.target
+    if job.reading.from_pnp is not None:  # of a camera neither is known
+        frame = target = "unknown"
     return {
-        "frame": _known("--frame", job.frame, job, sources),
-        "target": _known("--target", job.target, job, sources),
+        "frame": _known("--frame", frame, job, sources),
+        "target": _known("--target", target, job, sources),
         "attachment": _known("--attachment", job.attachment, job, sources),
     }
 

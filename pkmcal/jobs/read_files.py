@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, NamedTuple, get_args
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from pkmcal.jobs.reading import Reading, named
 from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.measurements.measurement_csv import read_measurements
 from pkmcal.measurements.measurements import Measurements
+from pkmcal.measurements.pnp import from_pnp
 from pkmcal.readings.boards import Board
 from pkmcal.readings.camera import Camera, Mount
 from pkmcal.readings.lens import Found
@@ -73,6 +74,7 @@ def read_file(
         stated["rotation"] = reading.rotation
     if reading.invert_poses:
         stated["invert_poses"] = True
+    pnp = None if reading.from_pnp is None else read_pnp(reading.from_pnp)
     if reading.probe_offset is not None:
         stated["probe_offset"] = _offset(reading.probe_offset)
     log = None if reading.controller is None else inputs.file(reading.controller)
@@ -81,7 +83,56 @@ def read_file(
     )
     for note in measured.notes:
         tell(note)
-    return measured
+    if pnp is None:
+        return measured
+    try:
+        mount = word("--camera-on", reading.camera_on, get_args(Mount))
+        return from_pnp(measured, pnp.focal, pnp.board, on=mount, noise=pnp.noise or 1.0)
+    except ArgumentError as error:
+        raise ArgumentError(f"--from-pnp: {path}: {error}") from None
+
+
+class Pnp(NamedTuple):
+    """What ``--from-pnp`` states.
+
+    Attributes
+    ----------
+    focal : float
+        Focal length, px.
+    board : (float, float)
+        Width and height, mm.
+    noise : float or None
+        Of corners, px; None: to be estimated.
+    """
+
+    focal: float
+    board: tuple[float, float]
+    noise: float | None
+
+
+def read_pnp(text: str) -> Pnp:
+    """Read ``f=640,board=160x120[,noise=0.3]``.
+
+    Raises
+    ------
+    ValueError
+        Anything else.
+    """
+    expected = ArgumentError(
+        f"--from-pnp {text}: expected f=FOCAL,board=WIDTHxHEIGHT[,noise=PX], as"
+        " f=640,board=160x120: px and mm"
+    )
+    parts = dict(map(named, text.split(",")))
+    if not {"f", "board"} <= parts.keys() <= {"f", "board", "noise"}:
+        raise expected
+    try:
+        width, height = map(typed, parts["board"].lower().split("x"))
+        focal, noise = typed(parts["f"]), typed(parts["noise"]) if "noise" in parts else None
+    except ValueError:
+        raise expected from None
+    if not min(width, height, focal, 1.0 if noise is None else noise) > 0.0:
+        raise ArgumentError(f"--from-pnp {text}: all numbers must be above 0")
+    return Pnp(focal, (width, height), noise)
 
 
 def cameras(reading: Reading) -> list[Camera]:
@@ -95,6 +146,11 @@ def cameras(reading: Reading) -> list[Camera]:
     """
     chosen = word("--lens", reading.lens, get_args(Found))
     mount = word("--camera-on", reading.camera_on, get_args(Mount))
+    if reading.from_pnp is not None and (reading.camera or reading.board):
+        raise ArgumentError(
+            "--from-pnp: of poses f and board say what the camera and the board were; --camera and"
+            " --board go with pixels"
+        )
     if not reading.camera:
         if reading.board:
             raise ArgumentError("--board: it is what a camera sees; state its lens, --camera FILE")

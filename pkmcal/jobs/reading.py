@@ -30,6 +30,8 @@ class Reading(Stated):
         Units of columns without one, order of angles, the probe's place.
     invert_poses : bool
         Whether poses are those of the base.
+    from_pnp : str or None
+        Poses are those of a board that other software found in pictures: "f=640,board=160x120".
     camera, board : tuple of str
         The lens file of a camera, and what it sees; of several each as "NAME=…".
     camera_on, lens, find_size
@@ -57,6 +59,7 @@ class Reading(Stated):
     rotation: str | None = None
     probe_offset: str | None = None
     invert_poses: bool = False
+    from_pnp: str | None = None
     camera: tuple[str, ...] = ()
     camera_on: str = "base"
     board: tuple[str, ...] = ()

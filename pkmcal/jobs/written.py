@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from pkmcal.jobs.calibration import Writing
 from pkmcal.jobs.inputs import Inputs
 from pkmcal.jobs.output import Output
 from pkmcal.kinematics.robot import Robot
+from pkmcal.measurements.measurements import Measurements
 
 
 @dataclass(frozen=True)
@@ -30,6 +32,8 @@ class Written:
         Whether the machine is that of a URDF file.
     machine, report, pdf : Output or None
         Files of ``--out``, ``--report`` and ``--pdf``.
+    instruments : tuple of str
+        Names of files of instruments as they are found, such as cameras, beside the machine's.
     statement : Input or None
         The file of ``--certificate``.
     """
@@ -38,12 +42,19 @@ class Written:
     inputs: Inputs
     urdf: bool
     machine: Output | None
+    instruments: tuple[str, ...]
     report: Output | None
     pdf: Output | None
     statement: Input | None
 
     @staticmethod
-    def planned(asked: Writing, robot: str, given: Robot | SerialArm, inputs: Inputs) -> Written:
+    def planned(
+        asked: Writing,
+        robot: str,
+        given: Robot | SerialArm,
+        measured: Sequence[Measurements],
+        inputs: Inputs,
+    ) -> Written:
         """Check what is to be written.
 
         Raises
@@ -56,12 +67,13 @@ class Written:
             raise ArgumentError(f"{option}: it is part of the report, --report DIR")
         urdf = isinstance(given, SerialArm) and given.source is not None
         names = ["robot.toml", "residuals.png", *["robot.urdf"] * urdf]
+        found_too = tuple(dict.fromkeys(filter(None, (m.instrument.file_name for m in measured))))
         machine = None
         if asked.out is not None:
-            machine = Output(Path(asked.out), names, inputs, asked.force)
+            machine = Output(Path(asked.out), [*names, *found_too], inputs, asked.force)
         report, pdf = _report(asked, inputs)
         statement = None if asked.certificate is None else _statement(asked.certificate, inputs)
-        return Written(robot, inputs, urdf, machine, report, pdf, statement)
+        return Written(robot, inputs, urdf, machine, found_too, report, pdf, statement)
 
     def write_machine(self, found: Identification) -> RigidArm | None:
         """Write robot.toml and the picture; of a URDF file that, too, and return what it lost."""
@@ -70,6 +82,9 @@ class Written:
         with self.machine.draft() as draft:
             save_robot(found, draft / "robot.toml", self.inputs, self.robot)
             found.plot(draft / "residuals.png")
+            for each in found.instruments:
+                if each.file_name:
+                    each.write(draft / each.file_name, self.inputs.comment())
             if self.urdf and isinstance(found.robot, SerialArm):
                 (rigid.arm if rigid else found.robot).save_urdf(draft / "robot.urdf")
         return rigid

@@ -17,6 +17,7 @@ from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.understood import Understood
 from pkmcal.kinematics.drive_state import DriveState
+from pkmcal.kinematics.reading_units import Actuated
 from pkmcal.measurements.actuator_sigma import ActuatorSigma
 from pkmcal.measurements.approach import Approach
 from pkmcal.measurements.beside import Beside
@@ -31,7 +32,7 @@ from pkmcal.measurements.field import (
 from pkmcal.measurements.former import OF_MEASUREMENTS, adapted
 from pkmcal.measurements.listing import table, title
 from pkmcal.measurements.measurement_writer import write_measurements
-from pkmcal.measurements.numbering import Group, Lines
+from pkmcal.measurements.numbering import Group, Lines, PoseName
 from pkmcal.measurements.poses import pose_index
 from pkmcal.measurements.session import Session
 from pkmcal.measurements.sigma import Sigma
@@ -105,6 +106,8 @@ class Measurements(Result):
     group : (N,) array of int, optional
         Rows with the same number are repeats of one pose, as rows with the same actuator readings
         are.
+    pose_name : (N,) sequence of str, optional
+        Names of these poses, such as those of pictures: messages call them by these.
     actuator_sigma : scalar, (n,) or (N, n) array, optional
         Standard deviation of what the actuators read, mm or rad. None: they are where they read on
         a machine with as many closures as free coordinates; on one with more, and with rows that
@@ -168,6 +171,7 @@ class Measurements(Result):
     sigma: FloatArray | None = declared(Sigma())
     target_index: Int64Array | None = declared(TargetIndex())
     group: Int64Array | None = declared(Group())
+    pose_name: TextArray | None = declared(PoseName())
     session: TextArray | None = declared(Session())
     temperature: FloatArray | None = declared(Temperature())
     time: FloatArray | None = declared(Time())
@@ -369,7 +373,9 @@ class Measurements(Result):
         held = np.isin(pose, drawn)
         return self.select(~held), self.select(held)
 
-    def write(self, path: str | PathLike[str], comment: str = "") -> None:
+    def write(
+        self, path: str | PathLike[str], comment: str = "", *, robot: Actuated | None = None
+    ) -> None:
         """Write a CSV file that `read_measurements` reads back to the last bit, or nothing.
 
         Parameters
@@ -378,13 +384,27 @@ class Measurements(Result):
             The file; replaced as a whole or not at all.
         comment : str, optional
             Lines for its head, each with its ``#``.
+        robot : Robot or SerialArm, optional
+            The machine that was measured: its actuators' units are those of measurements that
+            state no `actuator_units`. Without it, these are written as mm.
 
         Raises
         ------
         OSError
             The file cannot be written; one that was there before is untouched.
+        ValueError
+            The machine has other actuators.
         """
-        write_measurements(self, path, comment)
+        if robot is None or self.actuator_units is not None:
+            write_measurements(self, path, comment)
+            return
+        if len(robot.actuator_units) != self.actuators.shape[1]:
+            raise ArgumentError(
+                f"robot has {len(robot.actuator_units)} actuators, the measurements have"
+                f" {self.actuators.shape[1]}"
+            )
+        known = dataclasses.replace(self, actuator_units=robot.actuator_units)
+        write_measurements(known, path, comment)
 
     @staticmethod
     def from_pandas(frame: Any, robot: Any = None, **options: Any) -> Measurements:

@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from pkmcal.arrays import Int64Array
+from pkmcal.arrays import Int64Array, TextArray
 from pkmcal.files.csv_table import Table
 from pkmcal.files.csv_writer import WrittenColumn
 from pkmcal.measurements.field import Field, integers
 from pkmcal.readings.reading import Reading
+from pkmcal.readings.rows import names
 
 
 class Group(Field):
@@ -28,6 +29,16 @@ class Group(Field):
     def printed(self, m: Any) -> Iterator[WrittenColumn]:
         """Return the column of the printed table."""
         return self.framed(m)
+
+
+class PoseName(Field):
+    """The name of the pose of each row, such as a picture's, where a file has names of poses."""
+
+    unit = None
+
+    def kept(self, given: Any, m: Any) -> TextArray:
+        """Check names (N,)."""
+        return names(self.name, given, len(m))
 
 
 class Lines(Field):

@@ -18,6 +18,7 @@ from pkmcal.files.column_names import BESIDE, canonical
 from pkmcal.files.csv_table import Table
 from pkmcal.files.header import parted
 from pkmcal.measurements.actuator_columns import actuators_in
+from pkmcal.readings.rows import is_name
 
 _SLIP = 0.8  # how like a known name a mistyped one is, as difflib counts
 _SHOWN = 8  # names of columns in a message
@@ -218,6 +219,8 @@ def number_groups(table: Table) -> None:
         table.notes.append(f"column {column.name!r} left out: all rows are {column.cells[0]!r}")
         table.leave_out(["group"])
         return
+    if all(map(is_name, set(column.cells))):
+        table.columns.setdefault("pose_name", replace(column, also=True))
     place = _numbers_of(column.cells)
     table.columns["group"] = replace(column, cells=tuple(place[name] for name in column.cells))
 

@@ -11,7 +11,7 @@ scatter is then no noise of the corners, and is estimated beside it (`tells_actu
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from typing import Any, ClassVar, Literal, get_args
@@ -28,12 +28,13 @@ from pkmcal.readings import rows, twists
 from pkmcal.readings.alignment import Laid, Sighting, frame_of_poses
 from pkmcal.readings.board_poses import mm_per_pixel, pictures_told
 from pkmcal.readings.boards import Board
-from pkmcal.readings.lens import FOUND, LENS, Found, numbers_of_lens
+from pkmcal.readings.lens import FOUND, LENS, Found, covariance_of_lens, numbers_of_lens
 from pkmcal.readings.lens_doubts import lens_doubts
-from pkmcal.readings.lens_files import read_lens
+from pkmcal.readings.lens_files import read_lens, write_lens
 from pkmcal.readings.measured import InFit, Measured
+from pkmcal.readings.pictures import Picture, pictures
 from pkmcal.readings.predicted import At, Lots, Predicted, Shared
-from pkmcal.readings.reading import Reading, Sets, Solve
+from pkmcal.readings.reading import HeldNumbers, Reading, Sets, Solve
 from pkmcal.readings.seen_places import tool_places
 from pkmcal.readings.sight import visible
 from pkmcal.readings.unknowns import PLACE, Dependence, Numbers, Start, always
@@ -74,6 +75,9 @@ class Camera(Reading):
     lens : {"none", "focal", "all"}
         What of the lens is to be found beside the machine, from these values on: "focal" is fx fy
         cx cy, "all" k1 k2 p1 p2 as well: ``lens.fx`` …. State a prior where it is known roughly.
+    lens_sigma : (9,) or (9, 9) array, optional
+        Standard deviations of the nine numbers, or their covariance, where the lens was calibrated
+        before: it is then fitted along within these, where `lens` finds nothing of it.
     find_size : bool
         Whether the board may be larger than stated, by ``board.size`` (0.001: by 0.1 %).
     camera_name, board_name : str
@@ -115,6 +119,7 @@ class Camera(Reading):
     height: int = 0
     lens: Found = "none"
     find_size: bool = False
+    lens_sigma: ArrayLike | None = None
     board: Board | None = None
     camera_name: str = ""
     board_name: str = ""
@@ -128,6 +133,21 @@ class Camera(Reading):
     tells_actuators: ClassVar[bool] = True
     scaled_by: ClassVar[str] = "board"
     frame_order: ClassVar[int] = 5
+    held = (
+        HeldNumbers(
+            "another focal length or middle of the lens",
+            "--lens focal (lens='focal'), or calibrate the camera as it is",
+            "lens", (0, 1, 2, 3),
+        ),
+        HeldNumbers(
+            "another distortion of the lens",
+            "--lens all (lens='all'), or calibrate the camera as it is",
+            "lens", (4, 5, 6, 7),
+        ),
+        HeldNumbers(
+            "a board of another size", "measure it, or --find-size (find_size=True)", "size", (0,)
+        ),
+    )  # fmt: skip
     by_rows = ("lens", "size")
     own_points = ("corner",)
     truth = ("stands", "carried")
@@ -150,6 +170,61 @@ class Camera(Reading):
             Not such a file, or a lens that nine numbers do not describe.
         """
         return Camera(**{**read_lens(path), **others})
+
+    @property
+    def file_name(self) -> str:
+        """The name of the file that `write` makes of it, by the names of camera and board."""
+        return "-".join(filter(None, ("camera", self.camera_name, self.board_name))) + ".yaml"
+
+    def write(self, path: str | PathLike[str], comment: str = "") -> None:
+        """Write lens and `motions` as a lens file, which OpenCV and `from_file` read.
+
+        Parameters
+        ----------
+        path : str or path
+            The file.
+        comment : str
+            Lines for its head, each with its ``#``.
+        """
+        size = self.width, self.height
+        write_lens(path, self.lens_numbers(), size, self.motions, comment)
+
+    def drawn(self) -> dict[str, Any]:
+        """Tell a page where camera and board are, what the lens is and how large its pictures."""
+        stands, carried = self.motions.values()
+        places = [
+            {"R": motion[:3, :3].ravel().tolist(), "p": motion[:3, 3].tolist()}
+            for motion in (np.linalg.inv(stands), carried)
+        ]
+        corner = np.atleast_2d(np.asarray(self.corner, dtype=np.float64))
+        (left, top, low), (right, bottom, high) = corner.min(axis=0), corner.max(axis=0)
+        depth = 0.5 * float(low + high)
+        width, height = self.width or 2.0 * self.cx + 1.0, self.height or 2.0 * self.cy + 1.0
+        camera, board = places if self.on == "base" else places[::-1]
+        return {
+            "name": self.camera_name or "camera",
+            "rides": self.on == "platform",
+            "camera": camera,
+            "board": board,
+            "corners": [
+                [float(x), float(y), depth]
+                for x, y in ((left, top), (right, top), (right, bottom), (left, bottom))
+            ],
+            "lens": self.lens_numbers().tolist(),
+            "size": [float(width), float(height)],
+        }
+
+    @property
+    def motions(self) -> Mapping[str, FloatArray]:
+        """Motions (4, 4), mm, of a camera whose place is known, by what they take to what.
+
+        Of a camera on the base ``base_to_camera`` and ``board_to_platform``, of one on the platform
+        ``base_to_board`` and ``camera_to_platform``, which others call hand-eye calibration.
+        """
+        stands = "camera" if self.on == "base" else "board"
+        names = f"base_to_{stands}", f"{self._carried}_to_platform"
+        places = np.array([self.stands, self.carried], dtype=np.float64)
+        return dict(zip(names, screws.frames(places), strict=True))
 
     def seeing(self, q: ArrayLike, board: Board) -> tuple[FloatArray, Camera]:
         """Actuators (N, n) and the camera for pictures that show a whole board.
@@ -259,9 +334,10 @@ class Camera(Reading):
         yield always("tool", "tool", PLACE, [self._carried_thing] * count, data.starts)
         yield Dependence("corner", "corner", self._corners(count), {}, every)
         lens = np.tile(self.lens_numbers(), (count, 1))
-        slots = FOUND[self.lens]
-        found = {self.camera_name: self._lens_found(m, slots)} if slots else {}
-        yield Dependence("lens", "lens", lens, found, every)
+        known = None if self.lens != "none" else self._lens_known()
+        slots = FOUND[self.lens] if known is None else np.flatnonzero(np.diagonal(known)).tolist()
+        found = {self.camera_name: self._lens_found(m, slots, known)} if slots else {}
+        yield Dependence("lens", "lens" if known is None else "lens as stated", lens, found, every)
         if self.find_size:
             extent = float(np.abs(self._corners(count)).max(initial=1.0))
             number = Numbers(
@@ -270,6 +346,43 @@ class Camera(Reading):
             )  # fmt: skip
             sizes = {self.board_name: number}
             yield Dependence("size", "size", np.zeros((count, 1)), sizes, every)
+
+    def as_found(self, numbers: Mapping[str, float]) -> Camera:
+        """The camera where it is, with its lens, before a board of its size."""
+
+        def place(stem: str) -> FloatArray:
+            return np.array([numbers[f"{stem}.{axis}"] for axis, _ in PLACE])
+
+        stem = _dotted("lens", self.camera_name)
+        lens = {name: numbers.get(f"{stem}.{name}", getattr(self, name)) for name in LENS}
+        size = 1.0 + numbers.get(_dotted("board", self.board_name, "size"), 0.0)
+        found: dict[str, Any] = {
+            "lens": "none",
+            "lens_sigma": None,
+            "find_size": False,
+            "stands": place(_dotted("frame", self.frame_name)),
+            "carried": place(_dotted("tool", self._carried_thing)),
+        }
+        if self.corner is not None:
+            found["corner"] = np.asarray(self.corner, dtype=np.float64) * size
+        return self.with_fields(found | lens)
+
+    def pictures(self, m: Measured, pose: FloatArray, off: FloatArray) -> list[Picture]:
+        """Tell where each picture shows the board, and where the machine says that it is."""
+        lots = Lots(np.arange(len(pose)), np.arange(len(pose)))
+        at = At(pose, frame=np.asarray(self.stands, dtype=np.float64))
+        shared = self.shared(at, lots, tool=np.asarray(self.carried, dtype=np.float64))
+        motion, corner = self._boards(pose), self._corners(len(m))
+        return pictures(self._pictures(m), motion, corner, shared.by_motion, off, self.fx)
+
+    def _boards(self, pose: FloatArray) -> FloatArray:
+        """Boards (N, 4, 4) in axes of a camera whose place is known."""
+        stands, carried = (
+            screws.frames(np.asarray(each, dtype=np.float64)[None])
+            for each in (self.stands, self.carried)
+        )
+        board: FloatArray = stands @ screws.frames(np.ascontiguousarray(pose)) @ carried
+        return board if self.on == "base" else np.linalg.inv(board)
 
     def starts(self, machine: Any, sets: Sets, found: Starts) -> None:
         """Start at the platform; `places_seen` finds the place together with the frame."""
@@ -294,10 +407,23 @@ class Camera(Reading):
     def doubts(self, m: Measured) -> Iterator[str]:
         """Lenses of turned or rectified pictures, mirrored pictures."""
         used, number = self._pictures_told(m)
+        yield from self._outside(m)
         if not len(used) or self.lens != "none":
-            return iter(())
+            return
         corner, size = self._corners(len(m))[used], (self.width, self.height)
-        return lens_doubts(corner, m.values[used], self.lens_numbers(), number, size)
+        yield from lens_doubts(corner, m.values[used], self.lens_numbers(), number, size)
+
+    def _outside(self, m: Measured) -> Iterator[str]:
+        """Say that pixels are where pictures of this camera end."""
+        for name, word, end, seen in zip(
+            "uv", ("wide", "high"), (self.width, self.height), m.values.T, strict=True
+        ):
+            most, least = np.nanmax(seen, initial=0.0), np.nanmin(seen, initial=0.0)
+            if end and (most > end or least < -1.0):
+                yield (
+                    f"{name} reaches from {least:.0f} to {most:.0f} px, and pictures of this camera"
+                    f" are {end} px {word}: the lens is of pictures of another size, or turned"
+                )
 
     def _pictures_told(self, m: Measured) -> tuple[IntArray, IntArray]:
         """Rows (n,) of pictures that tell where a board is, and which picture each is of (n,)."""
@@ -312,16 +438,10 @@ class Camera(Reading):
         stands = as_rows("stands", self.stands, 6)[0][0]
         at = At(solve(m.actuators, "q").pose, frame=stands)
         seen = self.predict(at, **self.arguments(m)).values
-        base, moved, mounted = (
-            screws.frames(stands[None]),
-            screws.frames(at.pose),
-            self.arguments(m),
-        )
-        board = base @ moved @ screws.frames(mounted["tool"][None])
-        if self.on == "platform":
-            board = np.asarray(np.linalg.inv(board), dtype=np.float64)
         size = (self.width, self.height)
-        seen[~visible(board, self._corners(len(m)), seen, self.lens_numbers(), size)] = np.nan
+        seen[
+            ~visible(self._boards(at.pose), self._corners(len(m)), seen, self.lens_numbers(), size)
+        ] = np.nan
         return seen
 
     # units ----------------------------------------------------------------------------------------
@@ -358,6 +478,8 @@ class Camera(Reading):
                 " lens file (Camera.from_file), or state about 1.2 times the width of the pictures"
                 ' and lens="all"'
             )
+        if self.lens_sigma is not None:
+            covariance_of_lens(self.lens_sigma)
         own, read = super().of_rows(values, actuators, targets)
         return own, read
 
@@ -379,10 +501,15 @@ class Camera(Reading):
         """The nine numbers (9,), in the order of `LENS`."""
         return np.array([getattr(self, name) for name in LENS], dtype=np.float64)
 
-    def _lens_found(self, m: Measured, slots: tuple[int, ...]) -> Numbers:
-        """Numbers of the lens that are found."""
+    def _lens_found(self, m: Measured, slots: Sequence[int], known: FloatArray | None) -> Numbers:
+        """Numbers of the lens that are found, or fitted along as they are known (9, 9)."""
         mm, stem = float(self.mm(m, 1000.0)[0]), _dotted("lens", self.camera_name)
-        return numbers_of_lens(stem, self.lens_numbers(), slots, m.values, mm)
+        return numbers_of_lens(stem, self.lens_numbers(), tuple(slots), m.values, mm, known)
+
+    def _lens_known(self) -> FloatArray | None:
+        """Covariance (9, 9) of the lens; None where it is exact."""
+        known = None if self.lens_sigma is None else covariance_of_lens(self.lens_sigma)
+        return known if known is not None and known.any() else None
 
     def _pictures(self, m: Measured) -> IntArray:
         """Return the picture of each row, (N,), counted from 0."""

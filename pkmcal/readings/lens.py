@@ -6,10 +6,13 @@ from collections.abc import Mapping
 from typing import Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pkmcal.arrays import FloatArray
 from pkmcal.core import instruments
+from pkmcal.exceptions import ArgumentError
 from pkmcal.readings.board_poses import unbent
+from pkmcal.readings.rows import numbers
 from pkmcal.readings.unknowns import Numbers
 
 Found = Literal["none", "focal", "all"]
@@ -20,11 +23,17 @@ FOUND: Mapping[Found, tuple[int, ...]] = {
     "all": tuple(range(8)),
 }
 _UNITS = ("px", "px", "px", "px", "1", "1", "1", "1", "1")
+_ALIKE = 1e-12  # of a covariance in units of its deviations, what is rounding
 _LEAST = 1e-9  # of what a number of the lens moves pixels by, where it moves none
 
 
 def numbers_of_lens(
-    stem: str, lens: FloatArray, slots: tuple[int, ...], pixel: FloatArray, mm: float
+    stem: str,
+    lens: FloatArray,
+    slots: tuple[int, ...],
+    pixel: FloatArray,
+    mm: float,
+    spread: FloatArray | None = None,
 ) -> Numbers:
     """Numbers of a lens that are found, counted by how much they move what is seen.
 
@@ -40,6 +49,8 @@ def numbers_of_lens(
         What is seen; NaN where nothing is.
     mm : float
         A pixel at the board, mm.
+    spread : ndarray (9, 9), optional
+        Covariance of a lens that is known, and is fitted along.
     """
     known = np.isfinite(pixel).all(axis=1)
     rate = np.ones(9)
@@ -55,4 +66,36 @@ def numbers_of_lens(
         np.array(chosen, dtype=np.intp),
         lens[chosen],
         1.0 / mm / np.maximum(rate, _LEAST)[chosen],
+        None if spread is None else spread[np.ix_(chosen, chosen)],
     )
+
+
+def covariance_of_lens(given: ArrayLike) -> FloatArray:
+    """Covariance (9, 9) of a lens, of nine deviations or of a covariance; 0 of what is exact.
+
+    Raises
+    ------
+    ValueError
+        Other shapes, a negative deviation, no covariance.
+    """
+    found = numbers("lens_sigma", given)
+    if found.shape == (9,):
+        if (found < 0.0).any():
+            raise ArgumentError("lens_sigma: standard deviations must be 0 or above")
+        return np.diag(found**2)
+    if found.shape != (9, 9):
+        raise ArgumentError(
+            "lens_sigma must be nine standard deviations, of fx fy cx cy k1 k2 p1 p2 k3, or their"
+            f" covariance (9, 9); found {found.shape}"
+        )
+    some = np.flatnonzero(found.any(axis=0))
+    inner = found[np.ix_(some, some)]
+    sigma = np.sqrt(np.maximum(np.diagonal(inner), 0.0))
+    scaled = inner / np.maximum(np.outer(sigma, sigma), np.finfo(float).tiny)
+    if (
+        not (sigma > 0.0).all()
+        or not np.allclose(scaled, scaled.T, rtol=0.0, atol=_ALIKE)
+        or np.linalg.eigvalsh(scaled).min(initial=1.0) <= _ALIKE
+    ):
+        raise ArgumentError("lens_sigma: this is no covariance matrix (symmetric, positive)")
+    return np.asarray(0.5 * (found + found.T))

@@ -7,13 +7,18 @@ from collections.abc import Iterator
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.core import instruments
 from pkmcal.readings.board_poses import BoardPoses, board_poses, facing
+from pkmcal.readings.lens import LENS
 
 _FALLS = (
     3.0  # times less that corners are off with another lens, from which on that is the right one
 )
 _CLEAR = 0.3  # px that corners are off at least, to doubt a lens
 _MIDDLE = 0.1  # share of a picture by which the principal point is off its middle, at most
+_STEPS = 6  # towards a better lens
+_FEWEST = 4  # corners of a picture that tells something of it
+_TOLD = 1e-6  # of the largest singular value, from which combinations of its numbers are told
 _EXCHANGED = (1, 0, 3, 2, 4, 5, 7, 6, 8)  # numbers of a lens where x is y
 
 
@@ -40,11 +45,12 @@ def lens_doubts(
         Width and height of pictures, px; 0: not known.
     """
     found = board_poses(corner, pixel, lens, picture)
-    off = _typical(found)
+    off, said = _typical(found), False
     if off > _CLEAR:
         straight = np.where(np.arange(9) < 4, lens, 0.0)
         flat = _typical(board_poses(corner, pixel, straight, picture))
         if flat * _FALLS < off:
+            said = True
             yield (
                 f"the pictures have been rectified: corners are {off:.3g} px off with the"
                 f" distortion of the lens and {flat:.3g} px without; state the lens of rectified"
@@ -54,11 +60,23 @@ def lens_doubts(
     if (np.abs(lens[2:4] / ends - 0.5) > _MIDDLE).any():
         turned = _typical(board_poses(corner, pixel, lens[list(_EXCHANGED)], picture))
         if turned * _FALLS < max(off, _CLEAR):
+            said = True
             yield (
                 f"the lens is that of turned pictures: its middle {lens[2]:.0f}, {lens[3]:.0f} is"
                 f" far from that of pixels up to {ends[0]:.0f}, {ends[1]:.0f}, and with x and y"
                 f" exchanged corners are {turned:.3g} px off in place of {off:.3g}; exchange fx and"
                 " fy, cx and cy, p1 and p2, or turn the pictures as the lens was calibrated"
+            )
+    if off > _CLEAR and not said:
+        other, least = _better(corner, pixel, lens, picture, found)
+        if least * _FALLS < off:
+            numbers = ", ".join(
+                f"{name} {value:.4g}" for name, value in zip(LENS, other, strict=True) if value
+            )
+            yield (
+                f"the lens is not that of these pictures: corners are {off:.3g} px off with it and"
+                f" {least:.3g} px with another ({numbers}); calibrate the camera as it is, or"
+                ' identify the lens, too: --lens all (lens="all")'
             )
     behind = int((facing(found) < 0.0).sum())
     if behind > len(found.pose) / 2:
@@ -67,6 +85,47 @@ def lens_doubts(
             " mirrored, or corners numbered from the other side; places on the board are mirrored"
             " then, and with mirrored pictures nothing fits"
         )
+
+
+def _better(
+    corner: FloatArray,
+    pixel: FloatArray,
+    lens: FloatArray,
+    picture: IntArray,
+    found: BoardPoses,
+) -> tuple[FloatArray, float]:
+    """The lens (9,) with which corners fit best, each board where it then is; and how far off.
+
+    The latter is that of the median picture, px.
+    """
+    pose, best, least = found.pose[:, 0].copy(), lens, _typical(found)
+    for _ in range(_STEPS):
+        seen, by_motion, by_lens, _, _ = instruments.pixels(
+            np.ascontiguousarray(pose[picture]), corner, np.tile(lens, (len(corner), 1))
+        )
+        whole = np.concatenate([by_lens[:, :, :8], (pixel - seen)[:, :, None]], axis=2)
+        rows = []
+        for each in range(len(pose)):
+            mine = np.flatnonzero((picture == each) & np.isfinite(whole).all(axis=(1, 2)))
+            if len(mine) < _FEWEST:
+                continue
+            motion, _ = np.linalg.qr(by_motion[mine].reshape(-1, 6))
+            own = whole[mine].reshape(-1, 9)
+            rows.append(own - motion @ (motion.T @ own))
+        if not rows:
+            break
+        system = np.concatenate(rows)
+        size = np.linalg.norm(system[:, :8], axis=0)
+        size[size == 0.0] = 1.0
+        step = np.linalg.lstsq(system[:, :8] / size, system[:, 8], rcond=_TOLD)[0] / size
+        lens = lens + np.append(step, 0.0)
+        if not (lens[:2] > 0.0).all():
+            break
+        now = board_poses(corner, pixel, lens, picture)
+        if not _typical(now) < least:
+            break
+        pose, best, least = now.pose[:, 0].copy(), lens, _typical(now)
+    return best, least
 
 
 def _typical(found: BoardPoses) -> float:

@@ -15,20 +15,35 @@ from typing import Any
 
 import numpy as np
 
+from pkmcal.arrays import FloatArray
 from pkmcal.exceptions import FileError
+from pkmcal.files.atomic import write_whole
 
 _MATRIX = ("camera_matrix", "cameramatrix", "k", "m1", "intrinsic_matrix")
 _BENT = ("distortion_coefficients", "distcoeffs", "dist_coeffs", "dist_coeff", "d", "d1")
 _MODEL = ("distortion_model", "camera_model")
 _PLAIN = ("", "plumb_bob", "pinhole", "radtan", "brown", "opencv")
+_SIGMA = (
+    "stddeviationsintrinsics",
+    "std_deviations_intrinsics",
+    "std_deviation_intrinsics",
+    "standard_deviations",
+)
+_SIGMA_OF_PARTS = (("cameramatrix_std_dev", 4), ("dist_coeffs_std_dev", 5))
+_COVARIANCE = "lens_covariance"
+_RESOLUTION = "cameraresolution"  # of OpenCV's interactive calibration: width and height
 _SIZE = {"width": ("image_width", "width"), "height": ("image_height", "height")}
+_APART = 1e-6  # of two focal lengths in proportion, by which they differ nevertheless
 _NAMES = ("k1", "k2", "p1", "p2", "k3")
 _ENTRY = re.compile(r"^(?P<indent> *)(?:- )?(?P<name>[A-Za-z_][\w. -]*?) *: *(?P<rest>.*)$")
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 
 
-def read_lens(path: str | PathLike[str]) -> dict[str, float]:
-    """Read fx fy cx cy k1 k2 p1 p2 k3, and width and height where they are stated.
+def read_lens(path: str | PathLike[str]) -> dict[str, Any]:
+    """Read fx fy cx cy k1 k2 p1 p2 k3; where they are stated width, height and lens_sigma.
+
+    Standard deviations are those of OpenCV's calibrations, stdDeviationsIntrinsics or as its
+    interactive calibration writes them. lens_covariance is (9, 9).
 
     Raises
     ------
@@ -71,13 +86,86 @@ def read_lens(path: str | PathLike[str]) -> dict[str, float]:
             f"{file}: {len(bent)} distortion coefficients (rational, thin prism or tilted): only k1"
             " k2 p1 p2 k3 are supported; calibrate with these, or rectify the images"
         )
-    lens = dict(zip(("fx", "cx", "fy", "cy"), (matrix[i] for i in (0, 2, 4, 5)), strict=True))
+    lens: dict[str, Any] = dict(
+        zip(("fx", "cx", "fy", "cy"), (matrix[i] for i in (0, 2, 4, 5)), strict=True)
+    )
     lens |= dict(zip(_NAMES, bent, strict=False))
     for name, words in _SIZE.items():
         size = _numbers(_first(known, words))
         if len(size) == 1:
             lens[name] = int(size[0])
-    return lens
+    resolution = _numbers(known.get(_RESOLUTION))
+    if len(resolution) == 2:
+        lens = {"width": int(resolution[0]), "height": int(resolution[1])} | lens
+    sigma = _sigma(known, str(file))
+    return lens if sigma is None else lens | {"lens_sigma": sigma}
+
+
+def _sigma(known: Mapping[str, Any], file: str) -> FloatArray | None:
+    """Uncertainty of the nine numbers: a covariance (9, 9); None where none is stated.
+
+    A focal length that was held in proportion to the other is wrong by as much as that.
+    """
+    if _COVARIANCE in known:
+        found = np.array(_numbers(known[_COVARIANCE]))
+        if found.size != 81:
+            raise FileError(f"{file}: {_COVARIANCE} has {found.size} numbers, 9 x 9 are needed")
+        return found.reshape(9, 9)
+    stated = _numbers(_first(known, _SIGMA))
+    if not stated:
+        parts = [_numbers(known.get(name)) for name, _ in _SIGMA_OF_PARTS]
+        if not any(parts):
+            return None
+        for (name, count), part in zip(_SIGMA_OF_PARTS, parts, strict=True):
+            if len(part) != count:
+                raise FileError(f"{file}: {name} has {len(part)} numbers, {count} are needed")
+        stated = [number for part in parts for number in part]
+    sigma = np.array([*stated, *[0.0] * 9][:9])
+    if not np.isfinite(sigma).all() or (sigma < 0.0).any():
+        raise FileError(f"{file}: standard deviations of a lens must be 0 or above")
+    covariance = np.diag(sigma**2)
+    if (sigma[0] == 0.0) != (sigma[1] == 0.0):
+        both = float(sigma[:2].max())
+        covariance[:2, :2] = both**2 * (1.0 - _APART * (1.0 - np.eye(2)))
+    return covariance
+
+
+def write_lens(
+    path: str | PathLike[str],
+    lens: FloatArray,
+    size: tuple[int, int],
+    places: Mapping[str, FloatArray],
+    comment: str = "",
+) -> None:
+    """Write a lens as OpenCV's FileStorage does.
+
+    Parameters
+    ----------
+    path : str or path
+        The file.
+    lens : ndarray (9,)
+        fx fy cx cy k1 k2 p1 p2 k3.
+    size : (int, int)
+        Width and height of pictures, px; 0: not known.
+    places : mapping of str to ndarray (4, 4)
+        Motions by name, mm.
+    comment : str
+        Lines, each with its ``#``.
+    """
+    fx, fy, cx, cy, *bent = lens.tolist()
+    matrix = np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
+    lines = ["%YAML:1.0", "---", *comment.splitlines()]
+    if all(size):
+        lines += [f"image_width: {size[0]}", f"image_height: {size[1]}"]
+    named = {"camera_matrix": matrix, "distortion_coefficients": np.array([bent]).T, **places}
+    for name, values in named.items():
+        data = ", ".join(f"{value!r}" for value in values.ravel().tolist())
+        rows, columns = values.shape
+        lines += [
+            f"{name}: !!opencv-matrix", f"   rows: {rows}", f"   cols: {columns}", "   dt: d",
+            f"   data: [ {data} ]",
+        ]  # fmt: skip
+    write_whole(Path(path), "\n".join(lines) + "\n")
 
 
 def _first(known: Mapping[str, Any], names: tuple[str, ...]) -> Any:

@@ -12,6 +12,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
+from os import PathLike
 from typing import Any, ClassVar, Literal, NamedTuple, Protocol, TypeVar
 
 import numpy as np
@@ -79,6 +80,27 @@ def families_by_unit(units: tuple[str, ...]) -> tuple[Family, ...]:
     )
 
 
+class HeldNumbers(NamedTuple):
+    """Numbers of an instrument that a calibration holds and that may be wrong.
+
+    Attributes
+    ----------
+    name : str
+        What is wrong then, as messages say it.
+    cure : str
+        What helps.
+    argument : str
+        The argument of `Reading.predict` that has them.
+    slots : tuple of int
+        Which of its numbers they are.
+    """
+
+    name: str
+    cure: str
+    argument: str
+    slots: tuple[int, ...]
+
+
 class Reading:
     """A kind of reading. A subclass is a frozen dataclass; its fields are the instrument's own.
 
@@ -122,6 +144,8 @@ class Reading:
         Whether poses can be planned for the object that its word stands for.
     starts_by_pose : bool
         Whether `starts` needs the poses of the nominal machine.
+    held : tuple of HeldNumbers
+        Numbers of the instrument that are held unless asked otherwise, and may be wrong.
     by_rows : tuple of str
         Arguments of `shared` that rows depend on by themselves, not through their lot's motion.
     per_row : tuple of str
@@ -157,6 +181,7 @@ class Reading:
     by_firmware: ClassVar[bool] = False
     planned: ClassVar[bool] = True
     starts_by_pose: ClassVar[bool] = False
+    held: ClassVar[tuple[HeldNumbers, ...]] = ()
     by_rows: ClassVar[tuple[str, ...]] = ()
     per_row: ClassVar[tuple[str, ...]] = ()
     labels: ClassVar[tuple[str, ...]] = ()
@@ -230,6 +255,39 @@ class Reading:
         `pose` (N, 6) are those of the nominal machine. Of readings that depend on a tool.
         """
         return m.values
+
+    def as_found(self: Own, numbers: Mapping[str, float]) -> Own:
+        """The instrument with what a calibration found of it, by the names of its numbers.
+
+        By default itself.
+        """
+        return self
+
+    @property
+    def file_name(self) -> str:
+        """The name of the file of an instrument as it was found; "" of those that have none."""
+        return ""
+
+    def drawn(self) -> dict[str, Any] | None:
+        """Tell a page where an instrument as it was found stands and what it sees, or None."""
+        return None
+
+    @property
+    def motions(self) -> Mapping[str, FloatArray]:
+        """Motions (4, 4) of an instrument as it was found, by what they take to what; mm."""
+        return {}
+
+    def write(self, path: str | PathLike[str], comment: str = "") -> None:
+        """Write the instrument as it was found; `comment` are lines for the head of the file."""
+        raise NotImplementedError
+
+    def pictures(self, m: Measured, pose: FloatArray, off: FloatArray) -> Sequence[Any]:
+        """Tell what each picture shows, of readings that are taken in pictures; else nothing.
+
+        Of an instrument as it was found. `pose` (N, 6) are those of the machine where its actuators
+        say that it is, `off` (N, k) measured less predicted there.
+        """
+        return ()
 
     def follows_pose(self, machine: Any) -> bool:
         """Return whether it follows from one pose of the platform, wherever the actuators are."""

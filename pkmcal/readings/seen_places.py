@@ -20,6 +20,7 @@ from pkmcal.readings.hand_eye import of_frame_and_tool
 
 _FEWEST = 4  # pictures, more of which tell that they are mirrored
 _OFF, _FALLS = 0.1, 3.0  # rad by which mirrored pictures are off, and how many times less mirrored
+_STRANGE = 0.05  # of the extent of a board in a picture, by which its corners are off at most
 _DRAWN = 5  # pictures of a draw
 _DRAWS = 60
 _ROUNDS = 10  # of choosing and laying in turn
@@ -52,23 +53,44 @@ def tool_places(
     Raises
     ------
     ValueError
-        The pictures are mirrored.
+        The pictures are mirrored, or do not belong to these poses.
     """
     if not len(pose):
         return np.empty((0, 6))
     places, behind = _agreed(corner, pixel, picture, lens, rides, pose)
-    if not behind or len(pose) <= _FEWEST:
+    off = disagreement(places, pose) if len(pose) > _FEWEST else 0.0
+    if off <= _OFF:
         return places
     mirrored = lens * np.where(np.arange(9) == 7, -1.0, 1.0)  # p2
     across = pixel * [-1, 1] + [2 * lens[2], 0]
-    other, _ = _agreed(corner, across, picture, mirrored, rides, pose)
-    off, otherwise = disagreement(places, pose), disagreement(other, pose)
-    if off > _OFF and otherwise * _FALLS < off:
+    if behind:
+        other, _ = _agreed(corner, across, picture, mirrored, rides, pose)
+        otherwise = disagreement(other, pose)
+        if otherwise * _FALLS < off:
+            raise ArgumentError(
+                f"measurements: the pictures are mirrored: where they show the board differs by"
+                f" {np.degrees(off):.2g} deg from how the machine moves, and by"
+                f" {np.degrees(otherwise):.2g} deg with left and right exchanged; take"
+                " pictures without mirroring, or state u as the width less 1 less u"
+            )
+    trials = {
+        "with the camera on the other of base and platform": _agreed(
+            corner, pixel, picture, lens, not rides, pose
+        )[0],
+    }
+    found = {how: disagreement(places, pose) for how, places in trials.items()}
+    for how, rows in (("next", 1), ("previous", -1)):
+        found[f"with the actuators of the {how} picture"] = disagreement(
+            places, np.roll(pose, -rows, axis=0)
+        )
+    how = min(found, key=lambda each: found[each])
+    fits = f", and by {np.degrees(found[how]):.2g} deg {how}"
+    if found[how] * _FALLS < off or off > _GROSS:
         raise ArgumentError(
-            f"measurements: the pictures are mirrored: where they show the board differs by"
-            f" {np.degrees(off):.2g} deg from how the machine moves, and by"
-            f" {np.degrees(otherwise):.2g} deg with left and right exchanged; take"
-            " pictures without mirroring, or state u as the width less 1 less u"
+            f"measurements: where pictures show the board differs by {np.degrees(off):.2g} deg from"
+            f" how the machine moves{fits if found[how] * _FALLS < off else ''}: pictures and"
+            " actuators have to belong together, row by row; check what the camera is on, and signs"
+            " and units of the actuators"
         )
     return places
 
@@ -83,11 +105,28 @@ def _agreed(
 ) -> tuple[FloatArray, bool]:
     """Return `tool_places`, and whether most pictures show the board from behind."""
     boards = board_poses(corner, pixel, lens, picture)
+    _require_the_board(pixel, picture, boards.rms[:, 0])
     seen = np.where(boards.possible[:, :, None], boards.pose, np.nan)
     behind = bool(np.median(facing(boards)) < 0.0)
     if rides:
         seen = twists.inverse(seen.reshape(-1, 6)).reshape(seen.shape)
     return in_agreement(seen, pose), behind
+
+
+def _require_the_board(pixel: FloatArray, picture: IntArray, off: FloatArray) -> None:
+    """Refuse pictures that do not show the board: most corners are far from where it has them."""
+    count = np.bincount(picture)
+    middle = np.stack([np.bincount(picture, each) for each in pixel.T], axis=1) / count[:, None]
+    away = np.linalg.norm(pixel - middle[picture], axis=1)
+    extent = 2.0 * np.sqrt(np.bincount(picture, away**2) / count)
+    share = np.where(np.isfinite(off), off, np.inf) / extent
+    if np.median(share) > _STRANGE:
+        typical = float(np.median(off[np.isfinite(off)])) if np.isfinite(off).any() else np.inf
+        raise ArgumentError(
+            f"measurements: corners of most pictures are not where the board has them"
+            f" ({typical:.3g} px off, of boards of {np.median(extent):.3g} px): state the board that"
+            " was printed, columns before rows, and the lens of these pictures"
+        )
 
 
 def in_agreement(seen: FloatArray, pose: FloatArray) -> FloatArray:

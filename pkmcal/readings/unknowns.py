@@ -34,6 +34,9 @@ class Numbers:
         Where the search for them starts.
     scale : ndarray or None
         Change of each that moves readings about as 1 mm of the machine does; None: by the unit.
+    spread : ndarray (w, w) or None
+        Covariance of what is known of them: they are not looked for, but fitted along near where
+        they start. None: nothing is known.
     """
 
     names: tuple[str, ...]
@@ -41,6 +44,7 @@ class Numbers:
     slots: IntArray
     start: FloatArray
     scale: FloatArray | None = None
+    spread: FloatArray | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,9 +15,11 @@ from pkmcal.display import printable
 from pkmcal.estimation import misfits
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.fit_data import FitData
+from pkmcal.fitted.machine_accuracy import machine_accuracy
 from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.measurements.iso9283 import performance
 from pkmcal.measurements.repeats import groups
+from pkmcal.readings.constants import names_of_constants
 from pkmcal.report.places import Places
 
 _WORST = 10  # rows that are listed
@@ -79,6 +81,35 @@ def export_command(found: Identification) -> str:
     """Return the command that writes the calibrated machine for its firmware; "" of others."""
     controller = found.fit.parameters.robot.model.controller
     return "" if controller is None else controller.command("robot.toml")
+
+
+def instruments(found: Identification) -> list[dict[str, Any]]:
+    """List instruments of which a file is written: its name, their numbers, motions in mm."""
+    listed = {}
+    for each in found.instruments:
+        if each.file_name:
+            numbers = {name: getattr(each, name) for name in names_of_constants(each)}
+            listed[each.file_name] = {
+                "file": each.file_name,
+                "numbers": {k: v for k, v in numbers.items() if isinstance(v, int | float)},
+                "motions": {name: motion.tolist() for name, motion in each.motions.items()},
+            }
+    return [*listed.values()]
+
+
+def pictures(found: Identification) -> list[dict[str, Any]]:
+    """List pictures of boards: what each shows beside the calibration; mm, rad and px."""
+    return [
+        {
+            "name": each.name,
+            "use": each.use,
+            "camera": each.camera,
+            "board": each.board,
+            "outliers": each.outliers,
+            **vars(each.seen),
+        }
+        for each in found.pictures
+    ]
 
 
 def directions(found: Identification) -> list[dict[str, Any]]:
@@ -226,14 +257,27 @@ def iso9283(found: Identification) -> list[dict[str, Any]]:
     return scores
 
 
-def expected(found: Identification, places: FloatArray) -> FloatArray:
+def expected(
+    found: Identification, places: FloatArray, reference: FloatArray | None = None
+) -> FloatArray:
     """Predict the standard deviation of the tool, mm (N,), at poses (N, 6) or joints (N, n).
 
     Where the instrument's frame or targets were identified too, that of the first target in the
     instrument's frame: in the base frame it would contain the pose of the base, which no
-    measurement determines.
+    measurement determines. Of an instrument that reads no lengths, as a camera, that of the machine
+    by itself, whose frames are moved over the `reference` places, by default these.
     """
-    return as_seen(found, places) if instrument_identified(found) else found.accuracy(places)
+    if not instrument_identified(found):
+        return found.accuracy(places)
+    if reads_lengths(found):
+        return as_seen(found, places)
+    return machine_accuracy(found.fit, places, places if reference is None else reference)
+
+
+def reads_lengths(found: Identification) -> bool:
+    """Say whether what the first instrument reads, in the last session, are lengths."""
+    data, _ = _first_of_last(found)
+    return data.measured.instrument.units[:1] == ("mm",)
 
 
 def as_seen(found: Identification, places: FloatArray) -> FloatArray:
@@ -292,7 +336,9 @@ def over_the_workspace(
     if places.area is None:
         return sampled, None
     area = places.area
-    return sampled, Slice(area.axes, area.values, area.filled(expected(found, area.poses)))
+    return sampled, Slice(
+        area.axes, area.values, area.filled(expected(found, area.poses, places.poses))
+    )
 
 
 def over_the_measured(found: Identification) -> FloatArray:

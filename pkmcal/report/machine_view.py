@@ -34,7 +34,14 @@ def element(found: Identification) -> tuple[str, str]:
     data = page.machine(robot, cloud=False)  # the report has its own pictures of the workspace
     data["places"] = measured_poses(found)
     data["calibration"] = {"points": _points(found), "change": change(found)}
+    if seen := cameras(found):
+        data["cameras"] = seen
     return page.plain_element(data)
+
+
+def cameras(found: Identification) -> list[dict[str, Any]]:
+    """Cameras as they were found, and their boards: places in the base and on what is carried."""
+    return [view for each in found.instruments if (view := each.drawn()) is not None]
 
 
 def _points(found: Identification) -> list[dict[str, Any]]:

@@ -107,6 +107,8 @@ def gather(
         "moved": contents.moved(points),
         "directions": contents.directions(found),
         "parameters": contents.parameters(found),
+        "instruments": contents.instruments(found),
+        "pictures": contents.pictures(found),
         "held_out_numbers": contents.held_out_numbers(found),
         "correlation": contents.correlation(found),
         "iso9283": contents.iso9283(found),
@@ -121,6 +123,7 @@ def gather(
         "stiffness": yielding.of(found.robot, None if isinstance(places, str) else places),
         "inputs": checksums(files),
         "instrument_sought": contents.instrument_identified(found),
+        "of_target": contents.reads_lengths(found),
         "arm": found.fit.parameters.robot.kind == "arm",
         "export": contents.export_command(found),
         "version": version(),
@@ -161,7 +164,7 @@ def html(facts: Mapping[str, Any]) -> str:
 
 def _as_data(facts: Mapping[str, Any]) -> dict[str, Any]:
     """Select what goes into the JSON file: the facts, and every attribute of the calibration."""
-    left_out = ("found", "heat", "worst", "outlier_names", "wider", "moved", "arm")
+    left_out = ("found", "of_target", "heat", "worst", "outlier_names", "wider", "moved", "arm")
     kept = {name: value for name, value in facts.items() if name not in left_out}
     return kept | {"calibration": facts["found"]}
 

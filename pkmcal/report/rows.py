@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
@@ -13,11 +12,9 @@ from pkmcal.calibration.identification import Identification
 from pkmcal.estimation import misfits
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.evaluation import Evaluation
-from pkmcal.fitted.holdout import unfitted
+from pkmcal.fitted.instruments import Use, parts_of
 from pkmcal.fitted.row_names import name_of
 from pkmcal.report.residual_vectors import measured_places, residual_vectors
-
-Use = Literal["fitted", "held out", "left out"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,18 +83,8 @@ def rows(found: Identification) -> Rows:
 
 
 def _parts(found: Identification) -> Iterator[Rows]:
-    fit = found.fit
-    yield _rows(fit.equations, fit.start, fit.end, "fitted", found.outliers)
-    later = found.holdout_later
-    held = () if later is None else tuple(zip(later.data, later.like, strict=True))
-    kinds: tuple[tuple[Use, tuple[int, ...]], ...] = (
-        ("held out", found.holdout_outliers),
-        ("left out", ()),
-    )
-    for (use, odd), pairs in zip(kinds, (held, found.dropped_data), strict=True):
-        if pairs:
-            _, equations, ends, _ = unfitted(pairs, fit.estimator, fit.estimate, fit.uncertainty)
-            yield _rows(equations, *ends, use, odd)
+    for equations, start, end, use, odd in parts_of(found):
+        yield _rows(equations, start, end, use, odd)
 
 
 def _rows(

@@ -3,7 +3,10 @@
 Their mean square is compared with what noise and covariance let expect, by an F test whose degrees
 of freedom are Satterthwaite's: equations of one pose share errors, and poses may be unlike (F. E.
 Satterthwaite, An approximate distribution of estimates of variance components, Biometrics Bulletin
-2 (1946)).
+2 (1946)). Errors of parameters that points share make the mean square skew: of its upper tail the
+third moment counts as well, and the F distribution there is that of a chi-square variable with as
+much skewness, shifted and scaled (P. Hall, Chi squared approximations to the distribution of a sum
+of independent random variables, Annals of Probability 11 (1983)).
 """
 
 from __future__ import annotations
@@ -13,12 +16,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
-from pkmcal.statistics.distributions import f_limit, f_tail
+from pkmcal.statistics.distributions import f_limit, f_tail, skew_f_tail
 from pkmcal.statistics.linear_fit import numbered, sums
 from pkmcal.statistics.noise import Noise
 
-CHANCE = 0.01  # below which points contradict the fit …
+CHANCE = 0.005  # below which points contradict the fit …
 RATIO = 1.2  # … if their rms and their median are also so much larger than expected
+_FAR, _CLOSE = 1e6, 1e-9  # of the search for a limit: how far it begins, and ends
 NEARER = 1e-3  # chance below which they are nearer than expected, of a ratio below 1 / RATIO
 
 
@@ -38,6 +42,9 @@ class HoldoutTest:
         Degrees of freedom of the F test.
     of : int
         How many such tests are made of the points.
+    skewness : float
+        Degrees of freedom of a chi-square variable as skew as the sum of squares; by default of one
+        with those of the F test.
     """
 
     ratio: float
@@ -45,6 +52,7 @@ class HoldoutTest:
     chance: float
     freedom: tuple[float, float]
     of: int = 1
+    skewness: float = np.inf
 
     @property
     def contradicts(self) -> bool:
@@ -54,7 +62,13 @@ class HoldoutTest:
     @property
     def least_ratio(self) -> float:
         """Ratio of rms to what is expected from which the points can contradict the fit."""
-        return max(RATIO, float(np.sqrt(f_limit(CHANCE / self.of, *self.freedom))))
+        first, second = self.freedom
+        low, high = 0.0, f_limit(CHANCE / self.of / _FAR, first, second)
+        while high - low > _CLOSE * high:
+            middle = (low + high) / 2.0
+            above = skew_f_tail(middle, first, second, self.skewness) > CHANCE / self.of
+            low, high = (middle, high) if above else (low, middle)
+        return max(RATIO, float(np.sqrt(high)))
 
     @property
     def chance_nearer(self) -> float:
@@ -131,7 +145,8 @@ def holdout_test(
         np.einsum("ij,jk,ik->", held.design, covariance, held.design)
     ) / len(held.residual)
     ratio = float(np.sqrt(np.mean(held.residual**2) / expected))
-    first = _of_sum(held, split, covariance, in_common) * (1.0 - taken)
+    whole = _of_sum(held, split, covariance, in_common)
+    first, skewness = whole * (1.0 - taken), _of_skewness(held, split[0], covariance)
     second = min(_of_residuals(fitted, split), most)
     poses = np.bincount(fitted.pose)
     squares = np.bincount(fitted.pose, fitted.residual**2)[poses > 0] / poses[poses > 0]
@@ -142,7 +157,25 @@ def holdout_test(
         second = min(second, each * len(squares) * left)
     usual = fitted.median * np.sqrt(expected / split[0])
     median = held.median / usual if usual > 0 else float("nan")  # most readings are met exactly
-    return HoldoutTest(ratio, median, f_tail(ratio**2, first, second), (first, second))
+    own = min(skewness * first / whole, first)
+    chance = skew_f_tail(ratio**2, first, second, own)
+    return HoldoutTest(ratio, median, chance, (first, second), skewness=own)
+
+
+def _of_skewness(held: Lengths, total: float, covariance: FloatArray) -> float:
+    """Degrees of freedom of a chi-square variable as skew as the sum of squares of the points.
+
+    With as much variance of noise in all equations, which is not skew beside errors of parameters.
+    """
+    size, axes = np.linalg.eigh(covariance)
+    root = axes * np.sqrt(np.maximum(size, 0.0))
+    moved = root.T @ (held.design.T @ held.design) @ root
+    twice, m = moved @ moved, len(held.residual)
+    one, two = float(np.trace(moved)), float(np.trace(twice))
+    three = float((twice * moved).sum())
+    square = m * total**2 + 2.0 * total * one + two
+    cube = m * total**3 + 3.0 * total**2 * one + 3.0 * total * two + three
+    return square**3 / cube**2
 
 
 def _of_sum(

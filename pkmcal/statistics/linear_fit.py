@@ -21,6 +21,7 @@ _WHOLE = 9  # decimals from which degrees of freedom are whole: limits on them a
 _IN_ONE_THREAD = 8192  # numbers
 _COLUMNS_AT_ONCE = 32  # of a factorisation
 _FEW_COLUMNS = 4  # of one with many columns
+_MET = 1e-6  # share of the largest residual below which a component is met exactly
 _KEYS = 4096  # of rows that are added up at once
 
 
@@ -81,14 +82,30 @@ class LinearFit:
         return numbered(self.cluster, self.component)
 
     def without_idle(self, use: IntArray) -> IntArray:
-        """Equations `use` without those of a component that cannot move and was read as exactly 0.
+        """Equations `use` without those of a component that was read as exactly 0 and is met.
 
-        Such are angles of a delta in files of its controller: no noise, and no degrees of freedom.
+        Such are angles of a delta in files of its controller, and the height of a plane, which a
+        frame that is found meets as well: no noise, and no degrees of freedom.
         """
-        exact = np.flatnonzero(self.residual[use] == 0.0)
-        idle = exact[~(self.design[use[exact]] != 0.0).any(axis=1)]
-        kept: IntArray = np.delete(use, idle)
+        met = met_exactly(self.residual[use], self.component[use])
+        still = (self.residual[use] == 0.0) & ~(self.design[use] != 0.0).any(axis=1)
+        idle = met | still
+        kept: IntArray = use[~idle]
         return kept
+
+
+def met_exactly(residual: FloatArray, component: IntArray) -> BoolArray:
+    """Mark equations (M,) of components (M,) whose residuals are nothing but rounding errors.
+
+    Examples
+    --------
+    >>> met_exactly(np.array([0.3, 1e-17, -0.2, 0.0]), np.array([0, 1, 0, 1])).tolist()
+    [False, True, False, True]
+    """
+    size = np.abs(residual)
+    open_ones = np.bincount(component, size > _MET * size.max(initial=0.0))
+    met: BoolArray = open_ones[component] == 0.0
+    return met
 
 
 def reweighted(fit: LinearFit, deviations: FloatArray, prior_residual: FloatArray) -> LinearFit:
@@ -101,6 +118,56 @@ def reweighted(fit: LinearFit, deviations: FloatArray, prior_residual: FloatArra
     design, prior = design @ back, fit.prior @ back
     residual = residual - design @ (design.T @ residual + prior.T @ prior_residual)
     return replace(fit, design=design, residual=residual, prior=prior, back=fit.back @ back)
+
+
+def allowing(
+    fit: LinearFit, columns: FloatArray, deviation: float, prior_residual: FloatArray
+) -> tuple[LinearFit, FloatArray]:
+    """Solve a fit again with further numbers, each of a prior with deviation 1 about 0.
+
+    Parameters
+    ----------
+    fit : LinearFit
+        The fit.
+    columns : ndarray (M, k)
+        Derivatives of the whitened predicted values by these numbers.
+    deviation : float
+        Of the noise, in units of what equations were whitened by.
+    prior_residual : ndarray (q,)
+        Residuals of the prior's rows.
+
+    Returns
+    -------
+    LinearFit
+        Of p + k numbers, and residuals of its q + k rows of a prior.
+
+    Examples
+    --------
+    >>> rows = np.arange(6)
+    >>> y, slope = np.array([0.0, 1, 2, 3, 4, 5]), np.arange(6.0)[:, None]
+    >>> level = linear_fit(np.ones((6, 1)), y - y.mean(), np.zeros((0, 1)), np.eye(1), rows, rows)
+    >>> found, known = allowing(level, slope, 0.01, np.zeros(0))
+    >>> bool(np.abs(found.residual).max() < 1e-4), found.design.shape
+    (True, (6, 2))
+    """
+    k = columns.shape[1]
+    follow = fit.design.T @ columns
+    matrix = columns.T @ columns - follow.T @ follow + deviation**2 * np.eye(k)
+    half = np.linalg.inv(np.linalg.cholesky(matrix)).T
+    own = columns - fit.design @ follow
+    size = half @ (half.T @ (columns.T @ fit.residual))
+    prior = np.block([
+        [fit.prior, -fit.prior @ follow @ half],
+        [np.zeros((k, fit.design.shape[1])), deviation * half],
+    ])  # fmt: skip
+    found = replace(
+        fit,
+        design=np.hstack([fit.design, own @ half]),
+        residual=fit.residual - own @ size,
+        prior=prior,
+        back=np.hstack([fit.back, -fit.back @ follow @ half]),
+    )
+    return found, np.concatenate([prior_residual + fit.prior @ follow @ size, -deviation * size])
 
 
 def linear_fit(

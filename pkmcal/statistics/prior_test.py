@@ -38,6 +38,8 @@ class PriorTest:
         How likely the largest would be, among so many.
     factor : float
         On the prior's deviations, with which the ratio would be 1.
+    freedom : float
+        Of the noise with which they were compared; inf where it is stated.
     """
 
     ratio: float
@@ -45,6 +47,7 @@ class PriorTest:
     pulls: FloatArray
     pull_chance: float
     factor: float
+    freedom: float = np.inf
 
     @property
     def chance_of_either(self) -> float:
@@ -80,7 +83,12 @@ def left_alone(factor: FloatArray, count: int) -> tuple[float, float]:
 
 
 def prior_test(
-    with_prior: FloatArray, without: FloatArray, data: FloatArray, variance: float, freedom: float
+    with_prior: FloatArray,
+    without: FloatArray,
+    data: FloatArray,
+    variance: float,
+    freedom: float,
+    least: float = 0.0,
 ) -> PriorTest:
     """Test a prior.
 
@@ -94,6 +102,9 @@ def prior_test(
         What is measured less what is predicted at the prior's centre.
     variance, freedom : float
         Of the noise; inf degrees of freedom where it is stated.
+    least : float
+        Share of its deviation by which data have to move a combination of parameters for it to be
+        tested.
     """
     basis = np.zeros((len(data), 0))
     if without.shape[1]:
@@ -103,7 +114,8 @@ def prior_test(
     left = data - basis @ (basis.T @ data)
     turn, singular, rows = svd(own)
     shown = singular > ROUNDING * float(np.linalg.norm(with_prior))
-    if not shown.any():  # the other parameters take up all that the data say
+    shown &= singular**2 > least**2 * (singular**2 + variance)
+    if not shown.any():  # the data say nothing of them, or the other parameters take it up
         nothing = np.full(with_prior.shape[1], np.nan)
         return PriorTest(float("nan"), 1.0, nothing, 1.0, float("nan"))
     singular, rows = singular[shown], rows[shown]
@@ -126,6 +138,7 @@ def prior_test(
         pulls=pulls,
         pull_chance=min(1.0, chances * t_tail(largest, freedom)),
         factor=_fitting(along, singular, variance),
+        freedom=freedom,
     )
 
 

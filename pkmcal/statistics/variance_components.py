@@ -26,7 +26,7 @@ _DIFFERENT = 0.10  # chance of the likelihood ratio below which classes are told
 _NO_SLOPE = 0.3  # of a score test, above which the likelihoods of both are too much alike to look
 _ROUNDS, _SETTLED, _STEP, _HALVINGS = 50, 1e-6, 1.0, 12  # of the logarithms of the variances
 _SPENT = 1e-6  # share of the equations of a class that must be left
-_TINY = 1e-18  # of the mean variance: a class that the fit meets exactly
+_TINY = 1e-8  # of the mean variance: least of a class, as of one that the fit meets exactly
 
 
 @dataclass(frozen=True, eq=False)

@@ -96,7 +96,7 @@ def plain_element(data: dict[str, Any]) -> tuple[str, str]:
 
 def _more(data: dict[str, Any]) -> list[str]:
     """Scripts that not every page needs."""
-    return [name for name in ("calibration", "stiffness") if data.get(name)]
+    return [name for name in ("calibration", "cameras", "stiffness") if data.get(name)]
 
 
 def _given(data: dict[str, Any]) -> str:

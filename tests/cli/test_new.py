@@ -50,6 +50,15 @@ def test_every_key_that_a_limb_may_have_is_explained(name: str) -> None:
     assert {key for key in keys if not key.endswith("_tilt")} <= explained
 
 
+@pytest.mark.parametrize("name", [n for n in pk.machines() if n != "3r"])
+def test_uncertainties_that_it_offers_are_of_numbers_of_the_machine(name: str) -> None:
+    (line,) = (line for line in template(name).splitlines() if "all alike" in line)
+    geometry, offered = pk.load(name).geometry, re.findall(r'"([^"]+)" =', line)
+    assert len(offered) >= 2
+    for pattern in offered:
+        assert geometry.match(pattern)
+
+
 def test_command_in_the_file_names_the_file(run: Any, tmp_path: Path) -> None:
     for name in ("mine.toml", "two words.toml", "line\nbreak.toml"):
         assert run("new", "3r", str(tmp_path / name)).exit_code == 0

@@ -1,5 +1,6 @@
 """How wrong numbers that are not free may be: exact, and as draws of such machines show."""
 
+import json
 import warnings
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 import pkmcal as pk
 from benchmarks.bench_uncertainty import ABOVE, JOINTS, NOISE, SPREAD
 from pkmcal.diagnostics.breakeven import breakeven
+from pkmcal.report.as_json import as_json
 
 ROBOT = pk.load("hexapod")
 
@@ -74,6 +76,25 @@ def test_what_is_stated_free_or_redundant_is_not_in_it():
     m = pk.VirtualMachine(delta, noise=0.01, seed=1).measure(q, "position")
     free = [n for n in delta.geometry.match("*") if n not in delta.geometry.match("offset*")]
     assert breakeven(pk.identify(delta, m, free).fit) == ()
+
+
+def test_where_some_of_a_kind_are_stated_the_others_are_named_one_by_one():
+    q = ROBOT.inverse(pk.sample_poses(ROBOT, 40, seed=1))
+    m = pk.VirtualMachine(ROBOT, noise=0.02, seed=1).measure(q, "pose")
+    own = {**JOINTS, "gain[1-4]": 1e-3}
+    (gains,) = pk.identify(ROBOT, m, "offset*", uncertainty=own).breakeven
+    assert gains.kinds == ("gain5", "gain6")
+    considered = pk.identify(ROBOT, m, "offset*", uncertainty={"consider": own})
+    assert [each.kinds for each in considered.breakeven] == [("gain5", "gain6")]
+
+
+def test_it_is_in_the_result_as_json():
+    found = identified("pose")
+    lengths, ratios = json.loads(as_json(found))["breakeven"]
+    assert lengths == {
+        "kinds": ["base*", "platform*"], "unit": "mm", "deviation": found.breakeven[0].deviation
+    }  # fmt: skip
+    assert ratios["unit"] == "1"
 
 
 def test_the_summary_says_it():

@@ -175,12 +175,6 @@ def test_a_remedy_without_a_value_is_not_applied() -> None:
             pk.Remedy("fix").applied(before)
 
 
-def test_a_level_that_no_check_has_is_an_error(found: Identification) -> None:
-    strange = check("a", levels=("doubt", "remark"), level_of=lambda found, seen: "sure")
-    with pytest.raises(ValueError, match="a: level_of must say doubt, remark or None; said 'sure'"):
-        pk.diagnose(found, [strange])
-
-
 @pytest.mark.parametrize(("wrong", "says"), [
     ({"run": lambda found: None}, r"own: run must return its findings, \[\] of none; found None"),
     ({"run": lambda found: 1.0}, "own: run must return its findings"),
@@ -203,3 +197,9 @@ def test_one_level_or_one_name_may_stand_alone_and_a_check_has_a_name() -> None:
     assert one.unless == ("grave",)
     with pytest.raises(pk.ArgumentError, match="name of a check must be a word, found None"):
         check(cast(Any, None))
+
+
+def test_a_level_that_no_check_has_is_an_error(found: Identification) -> None:
+    strange = check("a", levels=("doubt", "remark"), level_of=lambda found, seen: "sure")
+    with pytest.raises(ValueError, match="a: level_of must say doubt, remark or None; said 'sure'"):
+        pk.diagnose(found, [strange])

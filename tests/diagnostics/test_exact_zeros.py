@@ -57,6 +57,60 @@ def test_a_plane_whose_height_is_exactly_zero_is_calibrated_from_noisy_angles() 
     assert pk.identify(robot, m).verdict.state in ("calibrated", "doubtful")
 
 
+def planar(name: str, seed: int, stated: bool, share: float = 0.4) -> tuple[pk.Robot, Any]:
+    """Places in a plane that a camera read in a frame of its own, of a machine with errors."""
+    robot, rng = pk.load(name), np.random.default_rng(seed)
+    units = dict(zip(robot.geometry.names, robot.geometry.units, strict=True))
+    small = {"mm": 0.2, "rad": 6e-4, "1": 0.0}
+    true = robot.replace({free: robot.geometry[free] + small[units[free]] * rng.normal()
+                          for free in robot.model.free})  # fmt: skip
+    poses = pk.sample_poses(robot, 45, seed=int(rng.integers(1_000_000)), share=share)
+    q = robot.inverse(poses)
+    read = true.forward(q, guess=poses).pose[:, :3].copy()
+    read[:, :2] += rng.normal([5.0, 3.0], NOISE, (45, 2))
+    read[:, 2] = 0.0
+    return robot, pk.Measurements(q, read, "position", sigma=NOISE if stated else None)
+
+
+@pytest.mark.parametrize("stated", [False, True])
+@pytest.mark.parametrize("name", ["3rrr-planar", "five-bar"])
+def test_a_plane_in_an_unknown_frame_is_calibrated(name: str, stated: bool) -> None:
+    """Its height is met exactly by three numbers of the frame, and told no noise of the others."""
+    for seed in range(4):
+        robot, m = planar(name, seed, stated)
+        found = pk.identify(robot, m, unknown="frame")
+        assert found.rank >= len(robot.model.free)
+        assert found.rms == pytest.approx(NOISE * np.sqrt(2.0), rel=0.35)
+        said = {said.check for said in found.verdict.said if said.level != "remark"}
+        assert not said & {"nothing-determined", "two-machines", "sides"}
+
+
+def test_a_search_with_other_weights_that_leaves_rows_unsolved_is_not_taken() -> None:
+    """It was an error of linear algebra."""
+    robot, m = planar("3rrr-planar", 4, False, 0.6)
+    with pytest.warns(pk.CalibrationWarning, match="another assembly mode"):
+        found = pk.identify(robot, m, unknown="frame")
+    assert np.isfinite(found.values).all()
+
+
+@pytest.mark.parametrize("name", ["3rrr-planar", "five-bar"])
+def test_a_height_that_is_exactly_zero_is_no_evidence_for_held_out_points(name: str) -> None:
+    """It counted as a third of the equations, and the tests had too many degrees of freedom."""
+    for seed in range(3):
+        robot, m = planar(name, seed, stated=False)
+        without = m.values.copy()
+        without[:, 2] = np.nan
+        with_zeros, alone = (
+            pk.identify(robot, pk.Measurements(m.actuators, values - [5.0, 3.0, 0.0], "position"),
+                        holdout=0.25)
+            for values in (m.values, without)
+        )  # fmt: skip
+        assert with_zeros.holdout_rms == pytest.approx(alone.holdout_rms, rel=1e-4)
+        assert with_zeros.holdout_expected == pytest.approx(alone.holdout_expected, rel=1e-3)
+        assert with_zeros.holdout_test is not None and alone.holdout_test is not None
+        assert with_zeros.holdout_test.chance == pytest.approx(alone.holdout_test.chance, rel=0.02)
+
+
 @pytest.mark.filterwarnings("ignore:.*further than errors of a machine")
 @pytest.mark.parametrize("name", [*STILL, "five-bar"])
 @pytest.mark.parametrize("wrong", ["late", "two machines"])

@@ -30,6 +30,7 @@ CONTENTS = {
     ".urdf": b"<a>\n  <b/>\n</a>\n",
     ".h": b"#ifndef A_H\n#define A_H\n#endif\n",
     ".c": b"int a;\n",
+    ".yaml": b"%YAML:1.0\n---\nimage_width: 640\n",
     ".ini": b"[A]\nB = 1\n",
     ".hal": b"setp a.b 1\n",
 }

@@ -25,6 +25,7 @@ STATED: dict[str, Any] = {
     "sigma": RANDOM.uniform(0.01, 0.1, (ROWS, 3)),
     "target_index": [0, 1, 1, 0, 1],
     "group": [3, 1, 4, 1, 5],
+    "pose_name": ["c.png", "a.png", "b b", "a.png", "d"],
     "session": ["a", "b", "b", "a", "c"],
     "temperature": RANDOM.uniform(15, 25, (ROWS, N + 2)),
     "time": RANDOM.uniform(0, 1e4, ROWS).cumsum(),

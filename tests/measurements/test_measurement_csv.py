@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+import pkmcal as pk
 from pkmcal.files import atomic as whole_file
 from pkmcal.measurements.measurement_csv import read_measurements
 from pkmcal.measurements.measurements import Measurements
@@ -249,6 +250,21 @@ def test_a_comment_stands_at_the_head_and_is_not_read(tmp_path: Path) -> None:
     m.write(tmp_path / "m.csv", "# made of nothing\n")
     assert (tmp_path / "m.csv").read_text().startswith("# made of nothing\nq1 [mm],")
     same(m, read_measurements(tmp_path / "m.csv"))
+
+
+def test_angles_of_actuators_are_written_as_angles_where_the_machine_is_given(
+    tmp_path: Path,
+) -> None:
+    robot = pk.load("rotary-delta")
+    q = robot.inverse(pk.sample_poses(robot, 4, seed=1))
+    m, path = pk.Measurements(q, np.zeros((4, 3)), "position"), tmp_path / "m.csv"
+    m.write(path, robot=robot)
+    np.testing.assert_array_equal(read_measurements(path, robot).actuators, q)
+    m.write(path)
+    with pytest.raises(ValueError, match="is a length; the robot's actuator is an angle"):
+        read_measurements(path, robot)
+    with pytest.raises(ValueError, match="robot has 6 actuators"):
+        m.write(path, robot=pk.load("hexapod"))
 
 
 def test_a_failed_write_leaves_the_old_file_and_nothing_else(

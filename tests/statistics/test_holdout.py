@@ -9,7 +9,8 @@ import pytest
 
 from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.statistics.clusters import Sandwich
-from pkmcal.statistics.holdout_test import HoldoutTest, Lengths, holdout_test
+from pkmcal.statistics.distributions import f_tail, skew_f_tail
+from pkmcal.statistics.holdout_test import CHANCE, HoldoutTest, Lengths, holdout_test
 from pkmcal.statistics.linear_fit import linear_fit, numbered
 from pkmcal.statistics.noise import noise
 
@@ -163,3 +164,43 @@ def test_errors_that_a_pose_has_in_common_take_degrees_of_freedom(share: float) 
     own = np.sqrt(1.0 - share) * rng.normal(size=(runs, poses * k))
     squares = ((common + own + rng.normal(size=(runs, p)) @ half.T @ design.T) ** 2).sum(axis=1)
     assert test.freedom[0] == pytest.approx(2.0 * squares.mean() ** 2 / squares.var(), rel=0.05)
+
+
+@pytest.mark.parametrize("ratio", [2.2, 2.6, 3.0])
+def test_the_upper_tail_of_a_skew_sum_is_that_of_draws(ratio: float) -> None:
+    """A direction of the parameters that points share weighs ten times as much as the noise."""
+    rng = np.random.default_rng(0)
+    weights = np.array([10.0] + 29 * [1.0])
+    above = []
+    for _ in range(8):
+        squares = rng.chisquare(1.0, (50_000, 30)) @ weights / weights.sum()
+        above.append(np.mean(squares > ratio * rng.chisquare(50.0, 50_000) / 50.0))
+    first, second, third = (float((weights**k).sum()) for k in (1, 2, 3))
+    freedom, skewness = first**2 / second, second**3 / third**2
+    found = skew_f_tail(ratio, freedom, 50.0, skewness)
+    assert found == pytest.approx(np.mean(above), rel=0.1)
+    assert f_tail(ratio, freedom, 50.0) < 0.9 * found
+
+
+def test_the_least_ratio_is_where_points_begin_to_contradict() -> None:
+    tested = HoldoutTest(2.0, 2.0, 0.0, (12.0, 50.0), skewness=3.0)
+    limit = tested.least_ratio
+    assert skew_f_tail(limit**2, 12.0, 50.0, 3.0) == pytest.approx(CHANCE, rel=1e-4)
+    plain = HoldoutTest(2.0, 2.0, 0.0, (12.0, 50.0)).least_ratio
+    assert f_tail(plain**2, 12.0, 50.0) == pytest.approx(CHANCE, rel=1e-4)
+    assert plain < limit
+
+
+def test_parameters_that_all_points_share_make_their_squares_skew() -> None:
+    """Against eigenvalues of the covariance of the residuals."""
+    rng = np.random.default_rng(3)
+    design, root = rng.normal(size=(24, 4)), rng.normal(size=(4, 4))
+    covariance = 0.3 * root @ root.T
+    rows = np.arange(24)
+    held = Lengths(rng.normal(size=24), design, rows, rows, 0 * rows)
+    fitted = Lengths(rng.normal(size=60), rng.normal(size=(60, 4)) * 0.1, *3 * [np.arange(60)])
+    tested = holdout_test(fitted, held, (1.0, 0.0), covariance)
+    size = np.linalg.eigvalsh(np.eye(24) + design @ covariance @ design.T)
+    expected = (size**2).sum() ** 3 / (size**3).sum() ** 2
+    whole = size.sum() ** 2 / (size**2).sum()
+    assert tested.skewness == pytest.approx(expected * tested.freedom[0] / whole, rel=1e-9)

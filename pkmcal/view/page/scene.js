@@ -6,6 +6,7 @@ const COLOURS = {
     track: '#a9b1b6', cable: '#56656e', bad: '#d6303a', badface: '#d6303a22', cone: '#8a6d00', coneface: '#c9a2271c',
     x: '#c0392b', y: '#2e8b3d', z: '#2a5bd7', cloud: '#0b728599', grid: '#d8dedd', shadow: '#1d2a3314',
     before: '#d55e00', after: '#0072b2', ghost: '#d55e0099', planned: '#7b4ab5',
+    camera: '#7a5c00', seen: '#2e8b3d', seenface: '#2e8b3d33',
   },
   dark: {
     paper: '#12191d', ink: '#e6ecec', dim: '#9fb0b8', label: '#7fe0f0', base: '#71808a', baseface: '#71808a22',
@@ -13,6 +14,7 @@ const COLOURS = {
     track: '#56636b', cable: '#9fb0b8', bad: '#ff5a63', badface: '#ff5a6328', cone: '#d8b84a', coneface: '#d8b84a1c',
     x: '#ff7b6b', y: '#63cf74', z: '#7ea4ff', cloud: '#3bc9dbaa', grid: '#26323a', shadow: '#00000040',
     before: '#ff9d4d', after: '#5db4ea', ghost: '#ff9d4d99', planned: '#b892ea',
+    camera: '#d8b84a', seen: '#63cf74', seenface: '#63cf7433',
   },
 }
 const FOCAL = 2.6, PIECE = 0.09 // of the size: long rods are sorted in pieces

@@ -7,6 +7,7 @@ async function start(root, data) {
   if (hasCones(data)) show.names.limits = 'joint cones'
   if (cloud) show.names.cloud = data.stiffness ? 'workspace, by stiffness' : 'workspace'
   if (data.places) show.names.places = data.places.name
+  if (data.cameras) show.cameras = true, show.names.cameras = 'cameras and boards'
   const assumed = data.calibration ? await loadedCore(data) : null
   root.replaceChildren()
   const canvas = made('canvas', root, { tabindex: 0, role: 'img', 'aria-label': `${data.name} in three dimensions: drag to turn it` })
@@ -16,6 +17,7 @@ async function start(root, data) {
     const limits = data.kind === 'arm' ? null : limitsOf(mover)
     const bodies = data.kind === 'arm' ? drawArm(mover, show) : drawParallel(mover, limits, show)
     if (data.places && show.places) bodies.list.push({ dots: data.places.poses.map(pose => pose.slice(0, 3)), colour: 'planned', wide: 4 })
+    if (data.cameras && show.cameras) root.seen = drawCameras(bodies, data.cameras, ...(data.kind === 'arm' ? [mover.frames.at(-1).slice(0, 9), mover.frames.at(-1).slice(9)] : [rotation(mover.pose), mover.pose.slice(0, 3)]))
     parts.calibration?.add(bodies)
     return [limits, bodies]
   }

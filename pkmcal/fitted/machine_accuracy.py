@@ -1,0 +1,65 @@
+"""Accuracy of a machine by itself, wherever its base and its platform are drawn.
+
+A camera tells neither where the base is nor where on the platform its board is to more than the
+lens allows, and no user needs it: what counts is how far the platform is off elsewhere after the
+best motions of both frames.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pkmcal import screw
+from pkmcal.arrays import FloatArray, propagate
+from pkmcal.fitted.fit import Fit
+from pkmcal.kinematics.calibratable import as_given, as_machine
+
+_NEGLIGIBLE = 1e-3  # mm a pose moves per mm along an undetermined combination
+_TOLD = 1e-9  # of the largest, a singular value of the motions of frames
+
+
+def machine_accuracy(fit: Fit, places: FloatArray, reference: FloatArray) -> FloatArray:
+    """Predict the standard deviation of the platform, mm (N,), but for motions of its frames.
+
+    Parameters
+    ----------
+    fit : Fit
+        Of sessions the machine is that of the last.
+    places : ndarray (N, 6), of an arm (N, n)
+        Where.
+    reference : ndarray (M, 6), of an arm (M, n)
+        Places over which both frames are moved as far as possible onto the true ones.
+
+    Returns
+    -------
+    ndarray (N,)
+        inf where it moves along with what the measurements do not determine.
+    """
+    rates, motions = _rates(fit, reference)
+    left, size, right = np.linalg.svd(motions.reshape(-1, 12), full_matrices=False)
+    told = size > _TOLD * size[0]
+    flat = rates.reshape(len(left), -1)
+    follow = right[told].T @ ((left[:, told].T @ flat) / size[told, None])
+    own_rates, own_motions = _rates(fit, places)
+    alone = (own_rates - own_motions @ follow)[:, 3:]
+    own = fit.parameters.geometry_of()
+    variance = propagate(alone, fit.covariance[np.ix_(own, own)])
+    undetermined = (fit.undetermined() * fit.parameters.scale[:, None])[own]
+    moved = np.linalg.norm(alone @ undetermined, axis=(1, 2))
+    return np.where(moved < _NEGLIGIBLE, np.sqrt(variance), np.inf)
+
+
+def _rates(fit: Fit, places: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Twists (N, 6, g) of the platform by numbers and (N, 6, 12) by motions of frames, as arcs."""
+    chosen = fit.parameters
+    machine = as_machine(as_given(chosen.robot.replace(chosen.values_at(fit.end.theta))))
+    at, q, _ = machine.commanded(places)
+    weights = np.repeat([machine.length, 1.0], 3)[:, None]
+    rates = machine.error_twists(at, q)[:, :, chosen.places] * weights
+    pose = screw.from_pose(at)
+    motions = np.zeros((len(at), 6, 12))
+    motions[:, :3, :3] = motions[:, 3:, 3:6] = np.eye(3)
+    motions[:, 3:, :3] = -np.cross(pose[:, :3, 3, None], np.eye(3)[None], axisa=1, axisb=1, axisc=1)
+    motions[:, :3, 6:9] = motions[:, 3:, 9:] = pose[:, :3, :3]
+    known: FloatArray = motions * weights
+    return rates, known

@@ -1,0 +1,146 @@
+"""Poses that somebody's own software found of a board in pictures (PnP), and how sure each is.
+
+Such a pose is a hundred times surer across the line of sight than along it, and its angles than
+they would be from afar: weighted alike, as software for hand and eye does, the rows tell a machine
+several times less than the pictures did. Which way each is sure follows from the pose itself: from
+pixels of a board of stand-in corners that a stand-in camera sees there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pkmcal.arguments import instance, number, word
+from pkmcal.arrays import FloatArray
+from pkmcal.core import instruments, screws
+from pkmcal.exceptions import ArgumentError
+from pkmcal.measurements.inverted import inverted
+from pkmcal.measurements.measurements import Measurements
+from pkmcal.readings import twists
+from pkmcal.readings.boards import Board
+
+_CORNERS = 5  # along and down a stand-in board
+_SLANTING = np.radians(75.0)  # from the normal of the board, of lines of sight that end on it
+
+
+def from_pnp(
+    measurements: Measurements,
+    focal: float,
+    board: Board | Sequence[float],
+    *,
+    on: str = "base",
+    noise: float = 1.0,
+) -> Measurements:
+    """State of poses from pictures how sure each is, as measurements with covariances.
+
+    Parameters
+    ----------
+    measurements : Measurements
+        Of kind "pose": the board in axes of the camera (z forward, x right, y down), as ``solvePnP``
+        and the like find it.
+    focal : float
+        Focal length of the camera, px.
+    board : Board, or (width, height)
+        What it saw; of an unknown board its size, mm, about where the lines of sight meet its
+        plane z = 0.
+    on : {"base", "platform"}
+        What the camera is fixed to; the board is on the other. On the platform the poses are
+        turned round: frame and tool are the base and the camera in axes of the board.
+    noise : float
+        Standard deviation of a corner, px, of all alike. `Identification.chi2_per_dof` says by how
+        much it is wrong: its square root times this is right.
+
+    Returns
+    -------
+    Measurements
+        Poses with `sigma` (N, 6, 6), for ``identify(unknown=["frame", "target"])``.
+
+    Raises
+    ------
+    ValueError
+        Other readings; a board that is not before the camera; a size, a focal length or a noise
+        that is not above 0.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import pkmcal as pk
+    >>> seen = pk.Measurements([[500] * 6], [[10, -5, 900, 0.1, 0.05, 0]], "pose")
+    >>> sigma = pk.from_pnp(seen, 1500, (160, 120), noise=0.3).sigma
+    >>> np.sqrt(np.diagonal(sigma[0])[:3]).round(3)  # along the line of sight it is worst
+    array([0.046, 0.041, 0.589])
+    """
+    m = instance("measurements", measurements, Measurements)
+    word("on", on, ("base", "platform"))
+    for name, value in (("focal", focal), ("noise", noise)):
+        if not number(name, value) > 0.0:
+            raise ArgumentError(f"{name} must be above 0 px; found {value!r}")
+    if m.kind != "pose":
+        raise ArgumentError(f"measurements: expected poses of a board, found kind {m.kind!r}")
+    read = np.isfinite(m.values).all(axis=1)
+    if not read.any():
+        raise ArgumentError("measurements: no pose was read in full")
+    behind = np.flatnonzero(read & ~(m.values[:, 2] > 0.0))
+    if len(behind):
+        row = int(behind[0])
+        raise ArgumentError(
+            f"measurements: in {len(behind)} of {int(read.sum())} rows the board is not before the"
+            f" camera (row {row}: z {m.values[row, 2]:.6g} mm): poses have to be those of the board"
+            " in axes of the camera; those of the camera in axes of the board have to be turned"
+            " round (--invert-poses)"
+        )
+    pose = np.ascontiguousarray(m.values[read])
+    corners = _corners(pose, board)
+    sigma = np.tile(np.eye(6), (len(m), 1, 1))
+    sigma[read] = _covariances(pose, corners, focal) * noise**2
+    stated = replace(m, sigma=sigma)
+    return stated if on == "base" else inverted(stated)
+
+
+def _corners(pose: FloatArray, board: Board | Sequence[float]) -> FloatArray:
+    """Corners (K, 3) in axes of the board."""
+    if isinstance(board, Board):
+        return board.places
+    size = np.asarray(board, dtype=np.float64)
+    if size.shape != (2,) or not (size > 0.0).all():
+        raise ArgumentError(f"board must be its width and height in mm, above 0; found {board!r}")
+    side = np.linspace(-0.5, 0.5, _CORNERS)
+    x, y = np.meshgrid(side * size[0], side * size[1])
+    middle = _middle(pose)
+    return np.column_stack([x.ravel() + middle[0], y.ravel() + middle[1], np.zeros(x.size)])
+
+
+def _middle(pose: FloatArray) -> FloatArray:
+    """Where on a board (2,) lines of sight meet its plane, the median; its origin if none does."""
+    camera = np.linalg.inv(screws.frames(pose))
+    eye, ahead = camera[:, :3, 3], camera[:, :3, 2]
+    meets = np.abs(ahead[:, 2]) > np.cos(_SLANTING)
+    if not meets.any():
+        return np.zeros(2)
+    eye, ahead = eye[meets], ahead[meets]
+    found: FloatArray = np.median(eye - ahead * (eye[:, 2] / ahead[:, 2])[:, None], axis=0)[:2]
+    return found
+
+
+def _covariances(pose: FloatArray, corners: FloatArray, focal: float) -> FloatArray:
+    """Covariances (N, 6, 6) of x y z α β γ, of corners seen with 1 px of noise."""
+    count, each = len(pose), len(corners)
+    lens = np.array([focal, focal, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    _, by_motion, _, _, depth = instruments.pixels(
+        np.repeat(pose, each, axis=0), np.tile(corners, (count, 1)), lens
+    )
+    if not (depth > 0.0).all():
+        row = int(np.argmin(depth)) // each
+        raise ArgumentError(
+            f"measurements: a part of the board is not before the camera in row {row}: the board is"
+            " smaller, or nearer where the camera looks"
+        )
+    rates = by_motion.reshape(count, 2 * each, 6) @ twists.twists_of_numbers(pose)
+    size = np.linalg.norm(rates, axis=1)
+    triangle = np.linalg.qr(rates / size[:, None, :], mode="r")
+    root = np.linalg.inv(triangle) / size[:, :, None]
+    found: FloatArray = root @ root.transpose(0, 2, 1)
+    return found

@@ -1,0 +1,114 @@
+"""Pictures of boards: where each shows its board, and where the machine says that it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.readings.board_poses import in_a_line
+
+_FEWEST = 4  # corners that tell a motion of a flat board
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture of a board beside what a calibration says of it.
+
+    Attributes
+    ----------
+    row : int
+        The first row of the picture, in its measurements.
+    corners : int
+        How many were read.
+    distance : float
+        From the camera to the middle of these corners, mm.
+    tilt : float
+        Between the line of sight and the normal of the board, rad.
+    mm_per_pixel : float
+        At the middle of the corners, across the line of sight.
+    across, along : float
+        How far the board is seen from where the machine says that it is, across the line of sight
+        and along it, mm; NaN of a picture that does not tell it.
+    turned : float
+        And how far it is turned, rad.
+    off : float
+        Distance of the corners from where they are then expected, rms, px: what no place of the
+        board explains.
+    off_commanded : float
+        Distance from where the machine says that they are, rms, px.
+    """
+
+    row: int
+    corners: int
+    distance: float
+    tilt: float
+    mm_per_pixel: float
+    across: float
+    along: float
+    turned: float
+    off: float
+    off_commanded: float
+
+
+def pictures(
+    picture: IntArray,
+    board: FloatArray,
+    corner: FloatArray,
+    by_motion: FloatArray,
+    off: FloatArray,
+    focal: float,
+) -> list[Picture]:
+    """List pictures in the order of their first rows.
+
+    Parameters
+    ----------
+    picture : ndarray of int (N,)
+        Which picture each row is of.
+    board : ndarray (N, 4, 4)
+        The board in axes of the camera, as the machine says.
+    corner : ndarray (N, 3)
+        In axes of the board, mm.
+    by_motion : ndarray (N, 2, 6)
+        Derivative of pixels to a twist of the board at the camera.
+    off : ndarray (N, 2)
+        Pixels less those that the machine says.
+    focal : float
+        Focal length, px.
+    """
+    found = []
+    for each in dict.fromkeys(picture.tolist()):
+        mine = np.flatnonzero((picture == each) & np.isfinite(off).all(axis=1))
+        first = int(np.argmax(picture == each))
+        if not len(mine):
+            found.append(Picture(first, 0, *[float("nan")] * 8))
+            continue
+        motion = board[mine[0]]
+        at = motion[:3, :3] @ corner[mine].mean(axis=0) + motion[:3, 3]
+        distance = float(np.linalg.norm(at))
+        sight = at / distance
+        tilt = float(np.arccos(np.clip(abs(sight @ motion[:3, 2]), 0.0, 1.0)))
+        across = along = turned = rest = float("nan")
+        one = np.zeros(len(mine), dtype=np.intp)
+        if len(mine) >= _FEWEST and not in_a_line(corner[mine], one, 1)[0]:
+            rates, seen = by_motion[mine].reshape(-1, 6), off[mine].ravel()
+            size = np.linalg.norm(rates, axis=0)
+            twist = np.linalg.lstsq(rates / size, seen, rcond=None)[0] / size
+            moved = twist[3:] + np.cross(twist[:3], at)
+            along = float(moved @ sight)
+            across = float(np.linalg.norm(moved - along * sight))
+            turned = float(np.linalg.norm(twist[:3]))
+            rest = _rms(seen - rates @ twist)
+        found.append(
+            Picture(
+                first, len(mine), distance, tilt, float(at[2]) / focal, across, along, turned, rest,
+                _rms(off[mine].ravel()),
+            )
+        )  # fmt: skip
+    return found
+
+
+def _rms(off: FloatArray) -> float:
+    """Distance in the picture, rms, of corners whose two numbers are off by these."""
+    return float(np.sqrt(2.0 * np.mean(off**2)))
