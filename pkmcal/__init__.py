@@ -191,9 +191,12 @@ __all__ = sorted((*_HOME_OF, *_MODULES))
 
 def __getattr__(name: str) -> Any:
     if name == "__version__":  # stated once, in pyproject.toml
-        from importlib.metadata import version
+        from importlib.metadata import PackageNotFoundError, version
 
-        return version("pkmcal")
+        try:
+            return version("pkmcal")
+        except PackageNotFoundError:  # sources on a path
+            return "not installed"
     if name in _MODULES:
         return import_module(f"pkmcal.{name}")
     if name not in _HOME_OF:

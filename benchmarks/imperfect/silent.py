@@ -1,6 +1,6 @@
 """Causes that were found calibrated in trials, with fewer than 90 % of the true values inside.
 
-No residual names some of them; docs/believe.md lists those with their figures.
+No residual names some of them; docs/model-errors.md lists those with their figures.
 """
 
 from __future__ import annotations

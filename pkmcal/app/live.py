@@ -25,6 +25,7 @@ from pkmcal.exceptions import Error
 
 _MOST = 20_000  # bytes of a request
 _SILENT = 1.0  # s, after which a line that says nothing finds out whether somebody still listens
+_LONGEST = 2**20  # bytes of a line that it says
 _LAST = 20.0  # s in which a process that was told to stop has stopped its machine
 _ELSEWHERE = "a measurement is going on; it has to end, or to be stopped, first"
 Message = dict[str, Any]
@@ -64,7 +65,6 @@ class Live:
             self._folder.refuse_links(self._folder.project)
         except (Error, OSError) as error:
             return _refused(400, str(error))
-        self._name = secrets.token_urlsafe(12)
         first = {"state": self._folder.project.table(), "given": asked}
         return StreamingResponse(self._lines(first), media_type="application/x-ndjson")
 
@@ -114,7 +114,11 @@ class Live:
                 process.stdin.write(json.dumps(message).encode() + b"\n")
 
     async def _lines(self, first: Message) -> AsyncIterator[bytes]:
-        name, following = self._name, None
+        if self._name:  # another tab was first
+            yield _line({"error": {"message": _ELSEWHERE}})
+            return
+        self._name = name = secrets.token_urlsafe(12)
+        following: asyncio.Future[bytes] | None = None
         try:
             yield _line({"run": name})
             self._process = process = await _launched(self._folder.path)
@@ -150,7 +154,8 @@ async def _launched(folder: Path) -> asyncio.subprocess.Process:
     return await asyncio.create_subprocess_exec(
         sys.executable, "-m", "pkmcal.app.measurer",
         stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE,
-        stderr=asyncio.subprocess.DEVNULL, cwd=folder, env={**threads, "PYTHONUTF8": "1"},
+        stderr=asyncio.subprocess.DEVNULL, cwd=folder, limit=_LONGEST,
+        env={**threads, "PYTHONUTF8": "1"},
         start_new_session=True,  # Ctrl-C in the terminal reaches it by the server alone, in order
     )  # fmt: skip
 

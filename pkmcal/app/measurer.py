@@ -52,7 +52,7 @@ class Measurer:
     def __init__(self, words: IO[str], answers: IO[str]) -> None:
         self._words, self._answers = words, answers
         self._speaking = threading.Lock()
-        self._stopped = threading.Event()
+        self._stopped, self._ready = threading.Event(), threading.Event()
         self._started = queue.Queue[bool]()
         self._typed = queue.Queue[tuple[object, str] | None]()
         self._questions, self._out = 0, ""
@@ -70,7 +70,8 @@ class Measurer:
         except Stopped:
             self._send({"error": {"message": self._there(), "stopped": True}})
         except (Error, OSError) as error:
-            self._send({"said": self._there()} if self._driven is not None else {})
+            if self._driven is not None:
+                self._say(self._there())
             self._send({"error": told(error)})
         except Exception as error:  # a fault of pkmcal's own: rows are in their file
             traceback.print_exc()
@@ -97,6 +98,7 @@ class Measurer:
                 words += [option, f"{getattr(rules, name):g}"]
         line = quoted(command("measure", [job.robot], [*words, "--out", out]))
         course = driven.course
+        self._ready.set()
         self._send({"ready": driven.words, "command": line, "over": course.over,
                     "course": _course(course, None)})  # fmt: skip
         if not course.over:
@@ -113,7 +115,8 @@ class Measurer:
             for line in self._words:
                 said = json.loads(line)
                 if said["do"] == "start":
-                    self._started.put(True)
+                    if self._ready.is_set():  # who starts has seen what it does
+                        self._started.put(True)
                 elif said["do"] == "type":
                     self._typed.put((said["number"], str(said["text"])))
                 else:
@@ -201,6 +204,7 @@ def main() -> None:
     with os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8") as answers:
         os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
         Measurer(sys.stdin, answers).run()
+    os._exit(0)  # a thread still listens, for which the interpreter would wait
 
 
 if __name__ == "__main__":

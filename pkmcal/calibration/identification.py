@@ -27,7 +27,8 @@ from pkmcal.display import Table
 from pkmcal.effects.expansion import in_words as heat_in_words
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.fitted.held_numbers import considered_places
-from pkmcal.fitted.instruments import CalibratedPicture, instruments, pictures
+from pkmcal.fitted.instruments import CalibratedPicture, pictures
+from pkmcal.fitted.instruments import instruments as instruments_of
 from pkmcal.fitted.machine_accuracy import machine_accuracy
 from pkmcal.fitted.row_names import row_names
 from pkmcal.fitted.solution import Machine, Solution
@@ -155,7 +156,7 @@ class Identification(Solution[Machine], Result):
         """
         equations, theta = self.fit.equations, self.fit.end.theta
         sets = range(len(equations.table.sets))
-        return tuple([*instruments(equations, theta, i)][-1][1] for i in sets)
+        return tuple([*instruments_of(equations, theta, i)][-1][1] for i in sets)
 
     @cached_property
     def pictures(self) -> tuple[CalibratedPicture, ...]:

@@ -20,7 +20,7 @@ def show(
     out: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE", help="The page; by default the machine's name with .html, here."
+            metavar="FILE", help="The page; by default the name of ROBOT's file with .html, here."
         ),
     ] = None,
     force: Force = False,

@@ -73,9 +73,9 @@ class Late:
 
 
 def late(found: Solution) -> Late | None:
-    """Test it; None where chance explains as much, or rows are mixtures, residuals rounding."""
+    """Test it; None where chance explains as much, or residuals are rounding."""
     sure = found.fit.uncertainty
-    if sure.mixed or sure.rounded or not sure.equations.whitening.any_read:
+    if sure.rounded or not sure.equations.whitening.any_read:
         return None
     visits = visits_of(found)
     tested = {
@@ -102,7 +102,7 @@ def _columns(found: Solution, place: FloatArray) -> Columns:
     The places are actuator readings.
     """
     fit = found.fit
-    table, end = fit.equations.table, fit.end
+    table, end = fit.equations.table, fit.estimate.evaluation
     first = np.cumsum([0, *map(len, table.sets)])
 
     def change(i: int, rows: slice, seen: Predicted) -> FloatArray:

@@ -15,10 +15,11 @@ from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.diagnostics.reach import reach
 from pkmcal.diagnostics.visits import Visits, visits_of
 from pkmcal.display import chance_text, first_rows, printable
+from pkmcal.estimation.uncertainty import Uncertainty
 from pkmcal.fitted.solution import Solution
 from pkmcal.statistics.distributions import f_tail
 from pkmcal.statistics.group_test import Groups, few_equations, group_test, within_reach
-from pkmcal.statistics.linear_fit import ROUNDING, column_basis, numbered
+from pkmcal.statistics.linear_fit import ROUNDING, LinearFit, column_basis, numbered, reweighted
 from pkmcal.statistics.two_regressions import best_division
 
 CHANCE = 1e-3  # below which a group of rows is of another machine
@@ -80,9 +81,9 @@ class Apart:
 
 
 def apart(found: Solution) -> Apart | None:
-    """Test all groups; None where rows are mixtures, residuals rounding errors, or too few."""
+    """Test all groups; None where residuals are rounding errors, or too few."""
     sure = found.fit.uncertainty
-    if sure.mixed or sure.rounded or not sure.equations.whitening.any_read:
+    if sure.rounded or not sure.equations.whitening.any_read:
         return None
     visits = visits_of(found)
     use, key = equations_of_visits(found, visits)
@@ -101,13 +102,29 @@ def apart(found: Solution) -> Apart | None:
 
 
 def equations_of_visits(found: Solution, visits: Visits) -> tuple[IntArray, IntArray]:
-    """Equations (u,) that outliers have no part in, and of which visit and component each is."""
+    """Equations (u,) that outliers have no part in, and of which visit and component each is.
+
+    Of mixtures each stands for itself: components of two poses are unlike.
+    """
     sure = found.fit.uncertainty
-    row = sure.labels.row
-    use = np.flatnonzero(~np.isin(sure.equations.table.rows, found.outliers)[row])
-    use = sure.fit.without_idle(use)
+    row = row_of_equation(sure)
+    odd = np.isin(sure.equations.table.rows, found.outliers)
+    if sure.mixed:
+        block = sure.equations.blocks.block_of_row
+        use = np.flatnonzero(~np.isin(sure.labels.row, block[odd]))
+        return use, np.arange(len(use))
+    use = sure.fit.without_idle(np.flatnonzero(~odd[row]))
     visit = visits.series[row][use], visits.visit[row][use]
     return use, numbered(*visit, sure.labels.component[use])
+
+
+def row_of_equation(sure: Uncertainty) -> IntArray:
+    """Row of each equation (M,), of a mixture the first of its pose."""
+    if not sure.mixed:
+        return sure.labels.row
+    block, first = np.unique(sure.equations.blocks.block_of_row, return_index=True)
+    counted: IntArray = first[block >= 0][sure.labels.row]
+    return counted
 
 
 def tested(
@@ -115,26 +132,46 @@ def tested(
 ) -> dict[str, Groups]:
     """Test each group of rows (N,) against the others; without those too small to be tested."""
     sure = found.fit.uncertainty
-    row = sure.labels.row
+    row = row_of_equation(sure)
     cell = np.zeros(len(row), dtype=np.intp)
     for mine in groups.values():
         cell = numbered(cell, mine[row].astype(np.intp))
-    fit = sure.of_own_deviations
+    fit = _with_sets_alike(sure)
     few = few_equations(fit.design, fit.residual, use, key, cell, reach(sure, fit))
     first = np.unique(cell, return_index=True)[1]  # an equation of each cell
     every = {name: few.tested(mine[row][first][few.cell]) for name, mine in groups.items()}
     return {name: each for name, each in every.items() if each is not None}
 
 
+def _with_sets_alike(sure: Uncertainty) -> LinearFit:
+    """The fit in which sets whose noise nobody stated have that of the same component of others.
+
+    A set of another machine may have got a noise that is what common numbers miss of it: then it
+    would say too little of numbers of its own.
+    """
+    fit, equations = sure.of_own_deviations, sure.equations
+    if sure.mixed or len(equations.table.sets) == 1 or equations.whole is not None:
+        return fit
+    group = equations.whitening.of_equations(equations.whitening.groups)
+    unstated = equations.blocks.unstated[group]
+    own = np.where(unstated, np.log(sure.factors[group]), 0.0)
+    alike = numbered(sure.labels.component, unstated.astype(np.intp))
+    common = (np.bincount(alike, own) / np.bincount(alike))[alike]
+    if np.allclose(own, common):
+        return fit
+    return reweighted(fit, np.exp(common - own), sure.prior_residual)
+
+
 def _in_no_order(found: Solution, visits: Visits, use: IntArray, key: IntArray) -> Apart | None:
     """Test the division of the visits into two groups that fits best."""
     sure = found.fit.uncertainty
-    visit = numbered(visits.series, visits.visit)[sure.labels.row]
+    row = row_of_equation(sure)
+    visit = numbered(visits.series, visits.visit)[row]
     chosen = np.unique(visit[use])
     chosen = chosen[:: max(1, -(-len(chosen) // _MOST))]
     among = np.isin(visit[use], chosen)
     use, key = use[among], key[among]
-    fit = sure.of_own_deviations
+    fit = _with_sets_alike(sure)
     few = few_equations(fit.design, fit.residual, use, key, visit, reach(sure, fit))
     unit = numbered(few.cell)
     mine = best_division(few.design, few.residual, unit)
@@ -150,7 +187,7 @@ def _in_no_order(found: Solution, visits: Visits, use: IntArray, key: IntArray) 
     chance = min(1.0, tested.chance * 2.0 ** (len(mine) - 1))
     belongs = np.isin(visit, np.unique(visit[use])[mine])
     rows = np.zeros(len(sure.equations.table.rows), dtype=bool)
-    rows[sure.labels.row[belongs]] = True
+    rows[row[belongs]] = True
     group = f"rows {first_rows(sure.equations.table.rows[rows].tolist(), 6)}"
     return Apart(group, chance, tested.apart, _elsewhere(found, rows, visits))
 

@@ -92,6 +92,8 @@ def content(path: str | PathLike[str], most: int) -> bytes:
 def _read(path: Path, most: int) -> bytes:
     """Read a file whole; of one without end no more than the limit."""
     if not path.exists():
+        if str(path) == "-":
+            raise MissingFileError("-: no such file; standard input is /dev/stdin")
         near = (each.name for each in path.parent.glob(f"*{path.suffix}"))
         raise MissingFileError(
             f"{path}: no such file{arguments.did_you_mean(path.name, near, listed=0)}"

@@ -1,9 +1,9 @@
 """A file that states the SHA-256 of the rest of itself: whether it is as it was written.
 
 What has no seal, or another content than it states, is somebody's work. The seal stands where the
-format has room for a remark: a comment of CSV, TOML, YAML, HTML, SVG, XML, URDF, C, ini and hal files,
-the first key of JSON, a text chunk before the end of PNG, a comment at the end of PDF. Other files,
-a printer's configuration and G-code among them, are their owner's and have no seal.
+format has room for a remark: a comment of CSV, TOML, YAML, HTML, SVG, XML, URDF, C, ini and hal
+files, the first key of JSON, a text chunk before the end of PNG, a comment at the end of PDF. Other
+files, a printer's configuration and G-code among them, are their owner's and have no seal.
 """
 
 from __future__ import annotations

@@ -33,6 +33,7 @@ _CONTACT = re.compile(
 )
 _REPORTS = ("probe at ", "Bed X:", "bed will contact at")  # what such lines hold
 _LONGEST_CELL = 131_072  # that csv takes
+_MOST_BROKEN = 8  # lines of one cell: more are a mark that nothing closes
 _GAP = re.compile(r" {2,}")
 _BRACKET = re.compile(r"\s+(?=[\[(])")
 
@@ -97,6 +98,7 @@ def text_rows(path: Path, content: bytes) -> TextRows:
                 _take_triggers(found, what, found_in)
                 return found
     found.separator = _separator([line for _, line in lines[:_LOOKED_AT]])
+    lines = _unbroken(lines, found.separator)
     found.rows = [(number, cells(path, number, line, found.separator)) for number, line in lines]
     if found.separator == " ":
         _widen_headings(found, lines)
@@ -110,9 +112,24 @@ def _take_triggers(found: TextRows, what: str, triggers: list[tuple[int, re.Matc
     found.notes.append(f"{len(triggers)} lines in which a firmware reports its probe")
 
 
+def _unbroken(lines: list[tuple[int, str]], separator: str) -> list[tuple[int, str]]:
+    """The lines, with those that a cell in quotation marks breaks in one, as wrapped headings."""
+    found: list[tuple[int, str]] = []
+    opened = re.compile(rf'(?:^|{re.escape(separator)})\s*"(?:[^"]|"")*$')
+    begun = 0  # lines of the cell that is open
+    for number, line in lines:
+        if begun:
+            found[-1] = (found[-1][0], f"{found[-1][1]} {line.strip()}")
+        else:
+            found.append((number, line))
+        still = '"' in found[-1][1] and opened.search(found[-1][1]) is not None
+        begun = begun + 1 if still and begun < _MOST_BROKEN else 0
+    return found
+
+
 def cells(path: Path, line: int, text: str, separator: str) -> list[str]:
     """The cells of one line."""
-    if not any(each in text for each in '"\0') and len(text) <= _LONGEST_CELL:  # nothing is quoted
+    if '"' not in text and len(text) <= _LONGEST_CELL:
         parts = [cell.strip() for cell in text.split(separator)]
         return [cell for cell in parts if cell] if separator == " " else parts
     try:
@@ -130,9 +147,16 @@ def _decoded(path: Path, content: bytes) -> tuple[str, list[str]]:
     else:
         encoding = "utf-8-sig"
     try:
-        return content.decode(encoding), []
+        text = content.decode(encoding)
     except UnicodeDecodeError as error:
         reason = error.reason
+    else:
+        if "\0" in text:
+            raise FileError(
+                f"{path}: has zero bytes, as UTF-16 without its mark and UTF-32 have: save it as"
+                " UTF-8"
+            )
+        return text, []
     try:
         text = content.decode("cp1252" if encoding == "utf-8-sig" else encoding)
     except UnicodeDecodeError:

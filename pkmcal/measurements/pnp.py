@@ -39,8 +39,8 @@ def from_pnp(
     Parameters
     ----------
     measurements : Measurements
-        Of kind "pose": the board in axes of the camera (z forward, x right, y down), as ``solvePnP``
-        and the like find it.
+        Of kind "pose": the board in axes of the camera (z forward, x right, y down), as
+        ``solvePnP`` and the like find it.
     focal : float
         Focal length of the camera, px.
     board : Board, or (width, height)

@@ -415,14 +415,14 @@ class Camera(Reading):
 
     def _outside(self, m: Measured) -> Iterator[str]:
         """Say that pixels are where pictures of this camera end."""
-        for name, word, end, seen in zip(
+        for name, way, end, seen in zip(
             "uv", ("wide", "high"), (self.width, self.height), m.values.T, strict=True
         ):
             most, least = np.nanmax(seen, initial=0.0), np.nanmin(seen, initial=0.0)
             if end and (most > end or least < -1.0):
                 yield (
                     f"{name} reaches from {least:.0f} to {most:.0f} px, and pictures of this camera"
-                    f" are {end} px {word}: the lens is of pictures of another size, or turned"
+                    f" are {end} px {way}: the lens is of pictures of another size, or turned"
                 )
 
     def _pictures_told(self, m: Measured) -> tuple[IntArray, IntArray]:

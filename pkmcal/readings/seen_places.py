@@ -73,16 +73,13 @@ def tool_places(
                 f" {np.degrees(otherwise):.2g} deg with left and right exchanged; take"
                 " pictures without mirroring, or state u as the width less 1 less u"
             )
-    trials = {
-        "with the camera on the other of base and platform": _agreed(
-            corner, pixel, picture, lens, not rides, pose
-        )[0],
-    }
-    found = {how: disagreement(places, pose) for how, places in trials.items()}
+    trials = {"with the camera on the other of base and platform": (not rides, pose)}
     for how, rows in (("next", 1), ("previous", -1)):
-        found[f"with the actuators of the {how} picture"] = disagreement(
-            places, np.roll(pose, -rows, axis=0)
-        )
+        trials[f"with the actuators of the {how} picture"] = rides, np.roll(pose, -rows, axis=0)
+    found = {
+        how: disagreement(_agreed(corner, pixel, picture, lens, *trial)[0], trial[1])
+        for how, trial in trials.items()
+    }
     how = min(found, key=lambda each: found[each])
     fits = f", and by {np.degrees(found[how]):.2g} deg {how}"
     if found[how] * _FALLS < off or off > _GROSS:
@@ -124,8 +121,8 @@ def _require_the_board(pixel: FloatArray, picture: IntArray, off: FloatArray) ->
         typical = float(np.median(off[np.isfinite(off)])) if np.isfinite(off).any() else np.inf
         raise ArgumentError(
             f"measurements: corners of most pictures are not where the board has them"
-            f" ({typical:.3g} px off, of boards of {np.median(extent):.3g} px): state the board that"
-            " was printed, columns before rows, and the lens of these pictures"
+            f" ({typical:.3g} px off, of boards of {np.median(extent):.3g} px): state the board"
+            " that was printed, columns before rows, and the lens of these pictures"
         )
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
 import subprocess
 import tempfile
 from pathlib import Path
@@ -59,6 +60,27 @@ def browser() -> str:
     )
 
 
+def _said(command: list[str]) -> str:
+    """Run a browser to its end and return what it says on stderr; none of its own stays behind."""
+    with subprocess.Popen(
+        command,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        errors="replace",
+        start_new_session=True,
+    ) as process:
+        try:
+            return process.communicate(timeout=_PATIENCE)[1]
+        except BaseException:  # out of patience, or interrupted
+            if hasattr(os, "killpg"):  # a browser may be a script that started one
+                os.killpg(process.pid, signal.SIGKILL)
+            else:
+                process.kill()
+            raise
+
+
 def print_page(page: Path, to: Path) -> None:
     """Print an HTML file.
 
@@ -72,15 +94,7 @@ def print_page(page: Path, to: Path) -> None:
     with tempfile.TemporaryDirectory(prefix="pkmcal-", ignore_cleanup_errors=True) as profile:
         command = [by, *_FLAGS, *root, f"--user-data-dir={profile}", f"--print-to-pdf={to}"]
         try:
-            done = subprocess.run(
-                [*command, page.resolve().as_uri()],
-                stdin=subprocess.DEVNULL,
-                capture_output=True,
-                text=True,
-                errors="replace",
-                timeout=_PATIENCE,
-            )
-            said = done.stderr.strip().splitlines()
+            said = _said([*command, page.resolve().as_uri()]).strip().splitlines()
         except subprocess.TimeoutExpired:
             said = [f"no answer within {_PATIENCE} s"]
         except OSError as error:

@@ -25,6 +25,7 @@ _FEW = 0.1  # of the residuals: more say that all are further off than stated
 _LEAST = 1e-9  # of other lengths: arrows that nobody sees
 _ROOM = 1.3  # of a panel, in the largest value that it shows
 _LOOKS = ((BLUE, "o"), (ORANGE, "s"), (GREEN, "^"))
+_FIRST = ("mm", "rad")
 _ALONE = (PINK, "D")  # of readings of one component
 
 
@@ -32,7 +33,7 @@ def _look(count: int, place: int, name: str) -> tuple[str, str]:
     """Colour and mark of a component, by its place among those of its unit."""
     if name == "z":  # a height is the z of a position
         return _LOOKS[2]
-    return _ALONE if count == 1 else _LOOKS[place]
+    return _ALONE if count == 1 else _LOOKS[place % len(_LOOKS)]
 
 
 @in_context
@@ -41,11 +42,8 @@ def residuals(found: Identification) -> Figure:
 
     Of very many rows the outliers and a sample of the others; the title says so.
     """
-    units = [
-        unit
-        for unit in ("mm", "rad")
-        if any(unit in m.units for m in found.fit.equations.table.sets)
-    ]
+    read = {unit for m in found.fit.equations.table.sets for unit in m.units}
+    units = sorted(read, key=lambda unit: (_FIRST.index(unit) if unit in _FIRST else 2, unit))
     figure = empty_figure(11.0, 3.0 * len(units) + 4.2)
     figure.set_layout_engine("constrained", wspace=0.06)  # a bar's label stands beside a panel's
     heights = [3.0] * len(units) + [4.2]
@@ -117,7 +115,8 @@ def _ring(panel: Axes, rows: FloatArray, values: FloatArray, most: float) -> Non
 def _over_the_workspace(panel: Axes, found: Identification, drawn: IntArray) -> None:
     """Draw residuals where they were measured: arrows in x and y, a colour for z.
 
-    Where nothing but angles was read their size is the colour, and where nothing was, the closures.
+    Where no lengths were read the size of what was is the colour, and where nothing was, the
+    closures.
     """
     vectors, label = residual_vectors(found.fit.equations, found.fit.end), "z [mm]"
     sizes = not np.isfinite(vectors).any()
@@ -166,15 +165,15 @@ def _over_the_workspace(panel: Axes, found: Identification, drawn: IntArray) -> 
 
 def _without_direction(found: Identification) -> tuple[FloatArray, str]:
     """Sizes of residuals (N, 3) as z, and what they are."""
-    sizes, angles = [], False
-    for place, residual in zip(found.fit.equations.table.pose_of, found.residuals, strict=True):
+    table, sizes, label = found.fit.equations.table, [], "closure [mm]"
+    for m, place, residual in zip(table.sets, table.pose_of, found.residuals, strict=True):
         if residual.shape[1]:
-            sizes.append(np.degrees(np.linalg.norm(residual, axis=1)))
-            angles = True
+            by, shown = displayed(1.0, m.units[0])
+            sizes.append(by * np.linalg.norm(residual, axis=1))
+            label = f"{'angle ' if m.units[0] == 'rad' else ''}off [{shown}]"
         else:
             sizes.append(found.closures[place])
     size = np.concatenate(sizes)
-    label = "angle off [deg]" if angles else "closure [mm]"
     return np.column_stack([0.0 * size, 0.0 * size, size]), label
 
 

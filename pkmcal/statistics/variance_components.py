@@ -146,7 +146,9 @@ class _Model:
         self.floor = _TINY * float(self.square.sum() / self.count.sum())
 
     def at(self, theta: FloatArray) -> _Point | None:
-        """Evaluate at variances (c,); None where a class has no freedom left."""
+        """Evaluate at variances (c,); None where a class has no freedom left, or all are met."""
+        if not (theta > 0.0).all():
+            return None
         weighted = self._inner / theta[:, None, None]
         normal = weighted.sum(axis=0) + self._known
         plain = np.linalg.inv(normal)

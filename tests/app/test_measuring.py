@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import http.client
 import json
+import os
 import signal
 import subprocess
 import time
@@ -92,7 +93,7 @@ def test_a_person_connects_starts_reads_and_calibrates(tmp_path: Path) -> None:
             form = page.locator("details form")
             form.get_by_label("address of the machine").wait_for()
             assert form.get_by_label("address of the machine").is_disabled()  # a person has none
-            form.get_by_label("machine", exact=True).select_option("reprap")
+            form.get_by_role("combobox", name="machine", exact=True).select_option("reprap")
             typed = form.get_by_label("address of the machine")
             assert typed.input_value() == ""
             typed.fill(address)
@@ -141,37 +142,79 @@ def test_a_person_connects_starts_reads_and_calibrates(tmp_path: Path) -> None:
 
 def test_stop_is_at_hand_on_every_screen_and_stops_the_machine(tmp_path: Path) -> None:
     folder = project(tmp_path / "project")
-    with duet() as (address, machine), browser.served(folder) as served:
-        with browser.page_of(served) as page:
-            page.get_by_role("button", name="3 Measure").click()
-            page.get_by_text("Measure with a machine now").click()
-            form = page.locator("details form")
-            form.get_by_label("machine", exact=True).select_option("reprap")
-            form.get_by_label("address of the machine").fill(address)
-            form.get_by_label("within, such as z=0:300").fill("z=5:40")
-            form.get_by_label("or poses").fill("4")
-            form.get_by_role("button", name="Connect").click()
-            panel = page.locator("#measuring")
-            panel.get_by_role("button", name="Start").click()
-            box = panel.get_by_role("textbox")
-            box.wait_for()
-            machine.long = True  # the next move does not end
+    with (
+        duet() as (address, machine),
+        browser.served(folder) as served,
+        browser.page_of(served) as page,
+    ):
+        page.get_by_role("button", name="3 Measure").click()
+        page.get_by_text("Measure with a machine now").click()
+        form = page.locator("details form")
+        form.get_by_role("combobox", name="machine", exact=True).select_option("reprap")
+        form.get_by_label("address of the machine").fill(address)
+        form.get_by_label("within, such as z=0:300").fill("z=5:40")
+        form.get_by_label("or poses").fill("4")
+        form.get_by_role("button", name="Connect").click()
+        panel = page.locator("#measuring")
+        panel.get_by_role("button", name="Start").click()
+        box = panel.get_by_role("textbox")
+        box.wait_for()
+        machine.long = True  # the next move does not end
+        box.fill("20.0")
+        box.press("Enter")
+        until(lambda: len(machine.lines) == 2)
+        page.get_by_role("button", name="2 Plan").click()
+        panel.get_by_role("button", name="Stop").click()
+        panel.get_by_text("stopped with 1 row in measured.csv").wait_for()
+        assert machine.lines[-1] == "M112" and len(machine.lines) == 3
+        panel.get_by_role("button", name="Close").click()
+        assert panel.count() == 0
+    assert rows(folder) == 1
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_its_panel_is_fit_for_readers_of_screens_and_for_telephones(
+    tmp_path: Path, dark: bool
+) -> None:
+    axe = os.environ.get("AXE")
+    if not axe:
+        pytest.skip("AXE names no axe-core: make test-app")
+    look = {"color_scheme": "dark" if dark else "light", "viewport": {"width": 390, "height": 844}}
+    with (
+        browser.served(project(tmp_path / "project")) as served,
+        browser.page_of(served, bypass_csp=True, **look) as page,
+    ):
+        page.get_by_role("button", name="3 Measure").click()
+        page.get_by_text("Measure with a machine now").click()
+        form = page.locator("details form")
+        form.get_by_label("within, such as z=0:300").fill("z=5:40")
+        form.get_by_label("or poses").fill("8")
+        form.get_by_label("rest before it is read, s").fill("0")
+        form.get_by_role("button", name="Connect").click()
+        panel = page.locator("#measuring")
+        panel.get_by_role("button", name="Start").click()
+        box = panel.get_by_role("textbox")
+        for row in range(8):
+            panel.get_by_text("press Enter").wait_for()
+            box.press("Enter")
+            panel.get_by_text(f"row {row + 1}, at").wait_for()
             box.fill("20.0")
             box.press("Enter")
-            until(lambda: len(machine.lines) == 2)
-            page.get_by_role("button", name="2 Plan").click()
-            panel.get_by_role("button", name="Stop").click()
-            panel.get_by_text("stopped with 1 row in measured.csv").wait_for()
-            assert machine.lines[-1] == "M112" and len(machine.lines) == 3
-            panel.get_by_role("button", name="Close").click()
-            assert panel.count() == 0
-    assert rows(folder) == 1
+        panel.get_by_text("measured as many as asked").wait_for()
+        page.evaluate(Path(axe).read_text(encoding="utf-8"))
+        found = page.evaluate("axe.run(document, { resultTypes: ['violations'] })")
+        assert not found["violations"], [
+            (each["id"], each["nodes"][0]["html"]) for each in found["violations"]
+        ]
+        assert page.evaluate("document.documentElement.scrollWidth") <= 390
 
 
 def test_nothing_moves_without_the_start_of_the_page_that_connected(tmp_path: Path) -> None:
     folder = project(tmp_path / "project")
     with duet() as (address, machine), browser.served(folder) as served:
         run = Stream(served, f"reprap:{address}")
+        for _ in range(20):  # before anybody could read what it does
+            assert run.say("start") in (200, 409)
         assert "driven by" in run.next("ready")["ready"]
         for name in ("x", "", run.name[:-1]):
             assert ask(served, "POST", f"/api/live/{name}/start", b"{}")[0] in (404, 409)
@@ -214,14 +257,15 @@ def test_whoever_goes_stops_the_machine_and_no_row_is_lost(tmp_path: Path, pulle
             run.next("ready")
             run.say("start")
             run.read("20.0")
-            run.next("row")
-            machine.long = True
-            run.read("20.0")
+            number = run.next("asked")["number"]
+            machine.long = True  # the move to the third pose does not end
+            run.say("type", number=number, text="20.0")
             until(lambda: len(machine.lines) == 3)
             if pulled == "tab":
                 run.close()
             elif pulled == "server":
                 served.process.kill()
+                served.process.wait(20)
             else:
                 pids = subprocess.run(
                     ["pgrep", "-P", str(served.process.pid), "-f", "pkmcal.app.measurer"],
@@ -230,7 +274,7 @@ def test_whoever_goes_stops_the_machine_and_no_row_is_lost(tmp_path: Path, pulle
                 assert len(pids) == 1
                 subprocess.run(["kill", "-9", *pids], check=True)
                 assert "look whether the machine moves" in run.next("error")["error"]["message"]
-                run.close()
+            run.close()
             if pulled != "measurer":
                 until(lambda: machine.lines[-1] == "M112")
             assert len(machine.lines) == 3 + (pulled != "measurer")
@@ -259,32 +303,30 @@ def test_ctrl_c_at_the_server_stops_the_machine(tmp_path: Path) -> None:
         run.close()
 
 
-@pytest.mark.parametrize(
-    ("machine", "given", "said"),
-    [
-        ("nothing:a", {}, "it has person"),
-        ("reprap:http://127.0.0.1:9", {}, "does not answer"),
-        ("moonraker:http://a/path", {}, "expected an address"),
-        ("person", {"out": "../x.csv"}, "a file of this project"),
-        ("person", {"out": "robot.toml"}, "a file of this project"),
-        ("person", {"out": "measured.csv", "safe_height": "high"}, "--safe-height"),
-        ("person", {"feed": -1.0}, "--feed"),
-        ("person", {"plan": {"kind": "height"}}, "state when to stop"),
-        ("person", {"plan": {"kind": "height", "count": 2, "odd": 1}}, "odd"),
-        ("person", {"instrument": "serial:/dev/nowhere"}, "nowhere"),
-    ],
-)
-def test_what_does_not_fit_is_said_and_nothing_is_written(
-    tmp_path: Path, machine: str, given: dict[str, Any], said: str
-) -> None:
+WRONG: list[tuple[str, dict[str, Any], str]] = [
+    ("nothing:a", {}, "it has person"),
+    ("reprap:http://127.0.0.1:9", {}, "does not answer"),
+    ("moonraker:http://a/path", {}, "expected an address"),
+    ("person", {"out": "../x.csv"}, "a file of this project"),
+    ("person", {"out": "robot.toml"}, "a file of this project"),
+    ("person", {"safe_height": "high"}, "--safe-height"),
+    ("person", {"plan": {"kind": "height"}}, "state when to stop"),
+    ("person", {"plan": {"kind": "height", "count": 2, "odd": 1}}, "odd"),
+    ("person", {"instrument": "serial:/dev/nowhere"}, "nowhere"),
+]
+
+
+def test_what_does_not_fit_is_said_and_nothing_is_written(tmp_path: Path) -> None:
     folder = project(tmp_path / "project")
     before = {each.name: each.read_bytes() for each in folder.iterdir()}
     with browser.served(folder) as served:
-        run = Stream(served, machine, **given)
-        while "error" not in (message := json.loads(run.answer.readline() or b"{}") or {}):
-            assert "ready" not in message
-        assert said in message["error"]["message"]
-        run.close()
+        for machine, given, said in WRONG:
+            run = Stream(served, machine, **given)
+            message = run.next("error", "ready")
+            assert said in message["error"]["message"], (machine, given)
+            while run.answer.readline():  # until its process has ended
+                continue
+            run.close()
         assert ask(served, "POST", "/api/live", b"[]")[0] == 400
         assert ask(served, "POST", "/api/live", b"x" * 30_000)[0] == 400
         assert state(served)["version"] == 1

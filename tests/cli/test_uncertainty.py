@@ -158,3 +158,18 @@ def test_templates_say_how_to_state_it(run: Run, tmp_path: Path) -> None:
         result = run("new", machine, tmp_path / f"{machine}.toml")
         assert result.exit_code == 0
         assert "# [uncertainty] how wrong" in (tmp_path / f"{machine}.toml").read_text()
+
+
+@pytest.mark.parametrize("options", [[], ["--uncertainty", "gain*=1e-7"], ["--fix", "gain*"]])
+def test_a_wrong_gain_is_named_whatever_is_stated_of_it(
+    run: Run, tmp_path: Path, options: list[str]
+) -> None:
+    robot, path = pk.load("rotary-delta"), tmp_path / "rows.csv"
+    q = robot.inverse(pk.sample_poses(robot, 50, seed=1, share=0.5))
+    true = robot.replace({"gain2": 1.004})
+    pk.VirtualMachine(true, noise=0.03, seed=1).measure(q, "position").write(path)
+    result = run("calibrate", "rotary-delta", path, "--json", *options)
+    assert result.exit_code == 1
+    verdict = json.loads(result.stdout)["verdict"]
+    assert verdict["state"] == "doubtful"
+    assert "residuals look like gains" in " ".join(verdict["reasons"])

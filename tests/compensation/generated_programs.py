@@ -168,7 +168,7 @@ def program(firmware: str, rng: random.Random, odd: int = 0, joints: bool = Fals
     end = rng.choice(["\n", "\r\n", "\r"] if firmware == "marlin" else ["\n", "\r\n"])
     mark = rng.choice(["", "", "\ufeff"])
     if mark and (not odd or rng.random() < 0.7):
-        lines.insert(0, rng.choice(["", "; made by hand"]))
+        lines.insert(0, "" if lines[0] == "%" else rng.choice(["", "; made by hand"]))
     return mark + end.join(lines) + rng.choice(["", end])
 
 

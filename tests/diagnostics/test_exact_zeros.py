@@ -142,3 +142,14 @@ def test_what_is_wrong_of_other_components_is_seen_beside_exact_zeros(
     found = pk.identify(robot, pk.Measurements(robot.inverse(at), values, kind), holdout=0.25)
     wanted = "late-readings" if wrong == "late" else "two-machines"
     assert wanted in {said.check for said in found.verdict.said if said.level == "doubt"}
+
+
+def test_places_that_a_machine_cannot_leave_are_no_error_of_linear_algebra() -> None:
+    """A machine that turns about a point, and a table that shows it in tenths of a millimetre."""
+    robot, rng = pk.load("agile-eye"), np.random.default_rng(2)
+    true = robot.replace({name: robot.geometry[name] + rng.normal(0, 1e-3)
+                          for name in robot.model.free})  # fmt: skip
+    q = robot.inverse(pk.sample_poses(robot, 40, seed=3))
+    seen = pk.VirtualMachine(true, noise=0.02, seed=4).measure(q, "position").values
+    found = pk.identify(robot, pk.Measurements(q, np.round(seen, 1)), prior=0.5)
+    assert found.verdict.state != "calibrated"

@@ -209,3 +209,57 @@ def test_pictures_of_corners_in_a_line_place_nothing(sound: pk.Measurements) -> 
     assert (
         np.isfinite(found.residuals[0]).all(axis=1).sum() == np.isfinite(values).all(axis=1).sum()
     )
+
+
+@pytest.mark.parametrize(
+    ("numbers", "word"),
+    [
+        ({"fx": 1530.0, "fy": 1535.0}, "focal length or middle of the lens"),
+        ({"cx": 655.0}, "focal length or middle of the lens"),
+    ],
+)
+def test_a_lens_that_is_off_is_named_as_the_cause(
+    sound: pk.Measurements, numbers: dict[str, float], word: str
+) -> None:
+    found, said = checks(with_lens(sound, **numbers))
+    assert found.verdict.state != "calibrated"
+    assert word in said["causes"] and "--lens focal" in said["causes"]
+
+
+def test_a_board_of_another_size_is_named_as_the_cause(sound: pk.Measurements) -> None:
+    larger = np.asarray(sound.instrument.corner) * 1.02
+    found, said = checks(with_lens(sound, corner=larger))  # type: ignore[arg-type]
+    assert found.verdict.state != "calibrated" and "a board of another size" in said["causes"]
+
+
+def test_a_lens_without_its_distortion_is_named_beside_a_fit_that_is_none(
+    sound: pk.Measurements,
+) -> None:
+    straight = with_lens(sound, k1=0.3, k2=0.0, p1=0.0, p2=0.0)
+    assert "the lens is not that of these pictures" in doubts(straight)
+    found, _ = checks(straight)
+    assert found.verdict.state != "calibrated"
+
+
+def test_pixels_beyond_the_edge_of_the_picture_are_said(sound: pk.Measurements) -> None:
+    assert "v reaches" not in doubts(sound)
+    narrow = with_lens(sound, height=300)
+    assert "v reaches from" in doubts(narrow) and "300 px high" in doubts(narrow)
+
+
+def test_pictures_of_another_board_are_refused(sound: pk.Measurements) -> None:
+    other = Board.chessboard(5, 6, 35)
+    places = np.tile(other.places, (len(sound) // len(other.ids), 1))
+    with pytest.raises(pk.ArgumentError, match="columns before rows"):
+        checks(with_lens(sound, corner=places))  # type: ignore[arg-type]
+
+
+def test_pictures_of_the_rows_beside_are_refused(sound: pk.Measurements) -> None:
+    shifted = np.roll(sound.actuators, len(BOARD.ids), axis=0)
+    with pytest.raises(pk.ArgumentError, match="deg with the actuators of the next picture"):
+        checks(replace(sound, actuators=shifted))
+
+
+def test_a_camera_on_the_other_of_base_and_platform_is_named(sound: pk.Measurements) -> None:
+    with pytest.raises(pk.ArgumentError, match="with the camera on the other of base"):
+        checks(with_lens(sound, on="platform"))  # type: ignore[arg-type]

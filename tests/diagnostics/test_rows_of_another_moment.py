@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from ..simulated import hexapod_poses, with_errors
 Read = Callable[[np.ndarray], np.ndarray]  # actuators to what is read there, of a true machine
 Simulated = tuple[Any, np.ndarray, Callable[[np.random.Generator], Read]]
 COUNT, SIZE = 60, 0.1
+EXAMPLES = Path(__file__).parents[2] / "examples"
 NOISE = np.array([0.02, 0.02, 0.02, 5e-5, 5e-5, 5e-5])  # mm, rad
 
 
@@ -141,6 +143,33 @@ def test_two_files_of_two_machines_are_told_apart() -> None:
     assert ".csv" in doubts(robot, *halves)["two-machines"].text
 
 
+@pytest.mark.filterwarnings("ignore:.*(further than errors|determined to no better)")
+def test_a_file_of_another_machine_is_not_taken_for_one_of_more_noise() -> None:
+    """One file is met to its noise, and all that the other is off was called its noise."""
+    rng = np.random.default_rng(13)
+    robot = pk.load("3rps")
+    found = []
+    for seed in range(4):
+        at = pk.sample_poses(robot, 45, seed=seed, share=0.5)
+        q, halves = robot.inverse(at, match=True), (slice(0, 22), slice(22, 45))
+        data = [
+            measured(q[rows], noisy(_poses(with_errors(robot, 0.2, rng), 6)(q[rows]), rng), f)
+            for rows, f in zip(halves, ("one.csv", "other.csv"), strict=True)
+        ]
+        found.append("two-machines" in doubts(robot, *data))
+    assert found == [True] * 4
+
+
+def test_files_of_unlike_noise_are_not_those_of_two_machines() -> None:
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        robot, q, true = [hexapod, delta, arm][seed % 3](rng)
+        read = noisy(true(rng)(q), rng)
+        read[:30] += 10.0 * (noisy(read[:30], rng) - read[:30])
+        halves = [measured(q[:30], read[:30], "one.csv"), measured(q[30:], read[30:], "other.csv")]
+        assert "two-machines" not in doubts(robot, *halves)
+
+
 def sides(q: np.ndarray, rng: np.random.Generator, lean: float) -> np.ndarray:
     """Half of the rows, the more on one side of the workspace the larger `lean`."""
     place = lean * q[:, 0] / q[:, 0].std() + rng.normal(size=len(q))
@@ -260,3 +289,47 @@ def test_nominal_poses_that_were_rounded_are_no_measurements(
     read = np.round(exact[:, : 3 if machine is delta else 6], digits)
     found = pk.identify(robot, measured(q, read), holdout=0.25)
     assert "nothing-measured" in {each.check for each in found.verdict.said}
+
+
+def cables(rng: np.random.Generator, count: int = 40) -> tuple[Any, np.ndarray, Any]:
+    """Eight cables on six ways to move: poses, and what draws the lengths of a true machine."""
+    robot = pk.load(str(EXAMPLES / "cable-robot" / "robot.toml"))
+    at = pk.sample_poses(robot, count, seed=int(rng.integers(1000)), share=0.5)
+    return robot, at, lambda r: with_errors(robot, 0.5, r).inverse(at)
+
+
+@pytest.mark.filterwarnings("ignore:.*longer than the others allow")
+@pytest.mark.parametrize("wrong", ["nothing", "late", "two machines"])
+def test_rows_are_tested_where_actuators_are_more_than_the_ways_to_move(wrong: str) -> None:
+    rng = np.random.default_rng(15)
+    robot, at, true = cables(rng)
+    q, read = true(rng) + 0.02 * rng.normal(size=(len(at), 8)), noisy(at, rng)
+    if wrong == "late":
+        q[1:] += 2e-4 * (q[:-1] - q[1:])
+    if wrong == "two machines":
+        q[1::2] = true(rng)[1::2]
+    said = doubts(robot, measured(q, read)).keys()
+    wanted = {"nothing": set(), "late": {"late-readings"}, "two machines": {"two-machines"}}
+    assert wanted[wrong] == NEW & said
+
+
+@MACHINES
+@pytest.mark.parametrize("wrong", ["nothing", "late", "two machines"])
+def test_rows_are_tested_where_actuators_have_noise(
+    machine: Callable[..., Simulated], wrong: str
+) -> None:
+    rng = np.random.default_rng(16)
+    robot, q, true = machine(rng)
+    turning = robot.actuator_units[0] == "rad" if isinstance(robot, pk.Robot) else True
+    deviation = 1e-5 if turning else 0.005
+    one, other = true(rng), true(rng)
+    driven = q + deviation * rng.normal(size=q.shape)
+    read = noisy(one(driven), rng)
+    if wrong == "late":
+        read[1:] += 3e-3 * (read[:-1] - read[1:])
+    if wrong == "two machines":
+        read[1::2] = noisy(other(driven), rng)[1::2]
+    kind = "pose" if read.shape[1] == 6 else "position"
+    data = pk.Measurements(q, read, kind, actuator_sigma=deviation)
+    wanted = {"nothing": set(), "late": {"late-readings"}, "two machines": {"two-machines"}}
+    assert wanted[wrong] == NEW & doubts(robot, data).keys()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import time
 import warnings
 from importlib.resources import files
 from pathlib import Path
@@ -322,6 +323,25 @@ def test_a_pdf_that_fails_leaves_the_report(
     assert failed.stdout == usual.stdout.replace(str(tmp_path / "usual"), str(tmp_path / "out"))
     written = {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()}
     assert written == {path.name: path.read_bytes() for path in (tmp_path / "usual").iterdir()}
+
+
+def test_a_browser_that_does_not_end_leaves_none_of_its_own_behind(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """It may be a script that starts one."""
+    broken_browser(tmp_path, '#!/bin/sh\nsleep 600 &\necho $! > "$0.child"\nwait\n')
+    monkeypatch.setenv("PATH", f"{tmp_path}:/bin:/usr/bin")
+    monkeypatch.setattr(pdf, "_PATIENCE", 2.0)
+    with pytest.raises(pk.ArgumentError, match=r"printed nothing: no answer within 2\.0 s"):
+        pdf.print_page(tmp_path / "page.html", tmp_path / "page.pdf")
+    child = int((tmp_path / "chromium.child").read_text())
+    for _ in range(100):  # until the system has seen it end
+        state = Path(f"/proc/{child}/stat")
+        if not state.exists() or state.read_text().rpartition(")")[2].split()[0] == "Z":
+            break
+        time.sleep(0.05)
+    else:
+        raise AssertionError(f"process {child} goes on")
 
 
 def test_a_browser_is_found_where_its_system_has_it(

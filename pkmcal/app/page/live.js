@@ -77,7 +77,7 @@ async function measured(asked) {
   const answer = made('input', null, { size: 12, 'data-key': 'reading', autocomplete: 'off' })
   const label = field(question, '', answer).previousElementSibling
   made('button', question, { text: 'Enter' })
-  let number = 0
+  let number = 0, over = false
   question.onsubmit = event => {
     event.preventDefault()
     question.hidden = true // until the next question
@@ -121,10 +121,12 @@ async function measured(asked) {
         const cells = [row, at, read, line].map(text => made('td', null, { text }))
         table.firstElementChild.after(made('tr', null, { className: warnings.length ? 'odd' : '' }, ...cells))
       }
+      over ||= Boolean(message.result || message.error)
       if (message.result) ended(head, message.result, told)
       if (message.error?.stopped) told.textContent = message.error.message
       else if (message.error) throw Error(message.error.message)
     }
+    if (!over) throw Error(server.ENDED)
   } finally {
     running = null
     removeEventListener('beforeunload', leaving)

@@ -1,0 +1,162 @@
+"""Poses from somebody's PnP: with the covariance of their pictures nothing of these is lost."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pkmcal as pk
+from pkmcal.measurements.inverted import inverted
+from pkmcal.readings import Board, Camera
+from pkmcal.readings.board_poses import board_poses
+
+BOARD = Board.chessboard(10, 5, 20)
+FREE = ["base*", "platform*", "offset*"]
+FOCAL, NOISE = 3478.0, 0.1
+
+
+def pictures(seed: int, count: int = 30) -> tuple[pk.Robot, pk.Measurements]:
+    """A hexapod with errors, and pictures of a board on it, whole."""
+    random, drawn = np.random.default_rng(seed), pk.load("hexapod")
+    names = drawn.geometry.match(FREE)
+    true = drawn.replace({n: drawn.geometry[n] + random.normal(0.0, 0.3) for n in names})
+    board = pk.screw.from_pose(np.array([0, 0, 20, np.pi + 0.02, 0.03, 0.3]))
+    board[:3, 3] -= board[:3, :3] @ BOARD.places.mean(axis=0)
+    camera = Camera(
+        fx=FOCAL, fy=FOCAL, cx=1223.5, cy=1023.5, stands=[-150, 120, 1950, 3.0, 0.1, 0.2],
+        carried=pk.screw.to_pose(board),
+    )  # fmt: skip
+    q = drawn.inverse(pk.sample_poses(drawn, count, seed=1, share=0.3))
+    at, seeing = camera.seeing(q, BOARD)
+    seen = pk.VirtualMachine(true, NOISE, seed).measure(at, seeing)
+    whole = np.isfinite(seen.values).all(axis=1).reshape(len(q), -1).all(axis=1)
+    rows = np.flatnonzero(np.repeat(whole, len(BOARD.ids)))
+    group = np.repeat(np.arange(len(q)), len(BOARD.ids))[rows]
+    own = seen.select(rows)
+    return true, pk.Measurements(own.actuators, own.values, own.instrument, group=group)
+
+
+def of_pictures(measured: pk.Measurements) -> pk.Measurements:
+    """The board in axes of the camera, picture by picture."""
+    camera = measured.instrument
+    first, number = np.unique(measured.group, return_index=True, return_inverse=True)[1:]
+    found = board_poses(
+        np.asarray(camera.corner), measured.values, camera.lens_numbers(), number.reshape(-1)
+    )
+    return pk.Measurements(measured.actuators[first], found.pose[:, 0], "pose")
+
+
+def fitted(measured: pk.Measurements, **options: Any) -> pk.Identification:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", pk.CalibrationWarning)
+        return pk.identify(pk.load("hexapod"), measured, FREE, fix="datum", **options)
+
+
+def off(found: pk.Identification, true: pk.Robot) -> float:
+    """Distances elsewhere, rms, after the best motions of base and platform."""
+    from ..calibration.test_found_cameras import _apart
+
+    q = pk.load("hexapod").inverse(pk.sample_poses(true, 40, seed=77, share=0.3))
+    away = _apart(true.forward(q).pose, found.robot.forward(q).pose)
+    return float(np.sqrt(np.mean(away**2)))
+
+
+UNKNOWN = {"unknown": ["frame", "target"]}
+
+
+def test_rows_with_their_covariance_are_worth_the_pictures_and_alike_they_are_not() -> None:
+    tried = [pictures(seed) for seed in range(3)]
+    each = []
+    for true, measured in tried:
+        poses = of_pictures(measured)
+        stated = pk.from_pnp(poses, FOCAL, BOARD, noise=NOISE)
+        several = (
+            fitted(measured), fitted(stated, **UNKNOWN), fitted(poses, **UNKNOWN)
+        )  # fmt: skip
+        each.append([off(found, true) for found in several])
+        assert several[1].chi2_per_dof == pytest.approx(1.0, abs=0.4)
+    pixels, covariances, alike = np.sqrt(np.mean(np.square(each), axis=0))
+    assert covariances == pytest.approx(pixels, rel=0.1)
+    assert alike > 2.5 * pixels
+
+
+def test_covariances_are_the_scatter_of_poses_from_pictures_that_are_drawn() -> None:
+    pose = np.array([[60.0, -40, 1200, 0.35, -0.25, 0.4]])
+    lens = np.array([FOCAL, FOCAL, 0, 0, 0, 0, 0, 0, 0])
+    corner, random = np.tile(BOARD.places, (400, 1)), np.random.default_rng(1)
+    from pkmcal.core import instruments
+
+    number = np.repeat(np.arange(400), len(BOARD.ids))
+    seen, *_ = instruments.pixels(np.repeat(pose, len(corner), axis=0), corner, lens)
+    drawn = board_poses(corner, seen + random.normal(0.0, NOISE, seen.shape), lens, number)
+    scatter = np.cov(drawn.pose[:, 0].T)
+    m = pk.Measurements([[500.0] * 6], pose, "pose")
+    stated = pk.from_pnp(m, FOCAL, BOARD, noise=NOISE).sigma
+    assert stated is not None
+    size = np.sqrt(np.diagonal(scatter))
+    np.testing.assert_allclose(
+        stated[0] / np.outer(size, size), scatter / np.outer(size, size), atol=0.2
+    )
+
+
+def test_a_camera_on_the_platform_has_the_poses_turned_round() -> None:
+    _, measured = pictures(0, 8)
+    poses = of_pictures(measured)
+    here = pk.from_pnp(poses, FOCAL, BOARD, on="platform")
+    there = inverted(pk.from_pnp(poses, FOCAL, BOARD))
+    np.testing.assert_array_equal(here.values, there.values)
+    np.testing.assert_array_equal(here.sigma, there.sigma)
+
+
+def test_a_stand_in_of_the_same_size_weighs_as_the_board_does() -> None:
+    _, measured = pictures(0, 8)
+    poses = of_pictures(measured)
+    board = pk.from_pnp(poses, FOCAL, BOARD).sigma
+    size = pk.from_pnp(poses, FOCAL, (180.0, 80.0)).sigma
+    assert board is not None and size is not None
+    ratio = np.sqrt(np.linalg.det(size) / np.linalg.det(board)) ** (1 / 6)
+    np.testing.assert_allclose(ratio, ratio[0], rtol=0.3)
+    assert 1.0 < ratio[0] < 2.0  # it has half as many corners
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"focal": 0.0}, "focal must be above 0"),
+        ({"noise": -1.0}, "noise must be above 0"),
+        ({"board": (10.0, 0.0)}, "width and height"),
+        ({"on": "table"}, "on"),
+    ],
+)
+def test_what_does_not_fit_is_refused(change: dict[str, Any], message: str) -> None:
+    m = pk.Measurements([[500.0] * 6], [[0, 0, 900, 0, 0, 0]], "pose")
+    given: dict[str, Any] = {"focal": 1000.0, "board": (100.0, 80.0), **change}
+    with pytest.raises(pk.ArgumentError, match=message):
+        pk.from_pnp(m, given.pop("focal"), given.pop("board"), **given)
+
+
+def test_poses_of_the_camera_in_axes_of_the_board_are_named() -> None:
+    camera_above = [[0, 0, -900, 0.1, 0, 0]]
+    with pytest.raises(pk.ArgumentError, match=r"1 of 1 rows.*z -900 mm.*--invert-poses"):
+        pk.from_pnp(pk.Measurements([[500.0] * 6], camera_above, "pose"), 1000, (100, 80))
+    with pytest.raises(pk.ArgumentError, match="kind 'position'"):
+        pk.from_pnp(pk.Measurements([[500.0] * 6], [[0, 0, 900.0]]), 1000, (100, 80))
+
+
+def test_a_table_of_poses_is_calibrated_by_one_command(
+    run: Callable[..., Any], tmp_path: Path
+) -> None:
+    _, measured = pictures(1)
+    poses = of_pictures(measured)
+    poses.write(tmp_path / "pnp.csv")
+    command = ("calibrate", "hexapod", tmp_path / "pnp.csv", "--free", ",".join(FREE))
+    result = run(*command, "--datum", "auto", "--from-pnp", f"f={FOCAL:g},board=180x80")
+    assert result.exit_code == 0, result.output
+    assert "chi²/dof 1.0" in result.stdout and "tool.alpha" in result.stdout
+    for text in ("f=0,board=10x10", "board=10x10", "f=100,board=10", "f=1,board=1x1,size=3"):
+        assert run(*command, "--from-pnp", text).exit_code == 2
