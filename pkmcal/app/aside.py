@@ -51,8 +51,8 @@ class Kept:
                     copy.unlink()
                 else:
                     said.append(
-                        f"{path.as_posix()} was not as it had been written, and was written again:"
-                        f" what was in it is kept as {copy}"
+                        f"{path.as_posix()} had been changed outside of this window and was written"
+                        f" again; the changed file is kept as {copy}"
                     )
             self._own |= {_digest(each) for each in paths if each.is_file()}
 

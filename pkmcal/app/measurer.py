@@ -135,7 +135,7 @@ class Measurer:
             if self._driven is not None:
                 self._driven.stop()
         except DeviceError as error:
-            self._say(f"the machine did not take the stop, stop it by hand: {error}")
+            self._say(f"the machine did not obey the stop: stop it by hand ({error})")
 
     def _ask(self, question: str) -> str:
         self._require_running()

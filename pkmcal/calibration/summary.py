@@ -214,7 +214,7 @@ def limits(
         if frames and identifiability.unidentifiable:
             yield filled(
                 "  ",
-                "--datum auto (fix='datum') holds as many numbers as only say where frames lie;"
+                "--datum auto (fix='datum') holds the numbers that only say where frames lie;"
                 " the others then have finite ±",
             )
     if correlations:

@@ -104,8 +104,9 @@ def in_words(found: tuple[Breakeven, ...]) -> str:
     if not found:
         return ""
     return (
-        f"± double on the whole if {', or '.join(map(str, found))}: numbers that are not free count"
-        " as exact; state --uncertainty (uncertainty=) if they may be wrong by as much"
+        f"numbers that are not free count as exact; ± double on the whole if"
+        f" {', or '.join(map(str, found))}: state --uncertainty (uncertainty=) if such errors are"
+        " possible"
     )
 
 

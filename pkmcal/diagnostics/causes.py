@@ -88,7 +88,7 @@ def _level(found: Solution, cause: FoundCause) -> Level:
 
 def _text(found: Solution, cause: FoundCause) -> str:
     also = f" (or as well {', '.join(cause.also)})" if cause.also else ""
-    harm = f", and the numbers move by {cause.shift:.2g} of their ±" if cause.shift > 0.5 else ""
+    harm = f", and the numbers move by {cause.shift:.2g} times their ±" if cause.shift > 0.5 else ""
     return (
         f"residuals look like {cause.name}{also}: with it they fall by {100 * cause.gain:.0f} %"
         f" ({chance_text(cause.chance)}){harm}; {cause.cure}"

@@ -68,14 +68,14 @@ class Apart:
         if self.elsewhere:
             return (
                 f"{self.group}, measured at other places than the other rows, and these fit better"
-                f" with numbers of their own, {self.residual:.2g} times the residuals"
-                f" ({chance_text(self.chance)}): the model misses something there, or the machine"
+                f" apart: the residuals are then {self.residual:.2g} times as large"
+                f" ({chance_text(self.chance)}). The model misses something there, or the machine"
                 " was changed meanwhile; poses in another order would tell"
             )
         return (
-            f"{self.group} and the other rows are as if of two machines: with numbers of its own"
-            f" each has {self.residual:.2g} times the residuals ({chance_text(self.chance)}). Were"
-            " files joined, or was the machine changed meanwhile? Calibrate each by itself, or find"
+            f"{self.group} and the other rows seem to come from two machines: fitted apart, they"
+            f" leave residuals {self.residual:.2g} times as large ({chance_text(self.chance)})."
+            " Were files joined, or was the machine changed meanwhile? Calibrate each by itself, or find"
             " what changed by session"
         )
 

@@ -41,15 +41,15 @@ def conclusion(course: Course) -> list[str]:
     dilution = course.choice.dilution
     if course.stated and dilution == dilution:
         found.append(
-            f"dilution {dilution:.2g}: so many times the noise of a reading arrives at the targets,"
-            " whatever the errors of the machine"
+            f"dilution {dilution:.2g}: the error predicted at the targets is {dilution:.2g} times"
+            " the noise of a reading, whatever the errors of the machine"
         )
     if course.reached:
         end = "enough"
     elif course.accuracy is None:
-        end = "measured as many as asked"
+        end = "all the poses that were asked for are measured"
     else:
-        end = f"not the {course.accuracy:g} mm asked for"
+        end = f"the {course.accuracy:g} mm that were asked for are not reached"
     return [*found, f"{predicted(course)}: {end}"]
 
 
