@@ -75,8 +75,8 @@ class Apart:
         return (
             f"{self.group} and the other rows seem to come from two machines: fitted apart, they"
             f" leave residuals {self.residual:.2g} times as large ({chance_text(self.chance)})."
-            " Were files joined, or was the machine changed meanwhile? Calibrate each by itself, or find"
-            " what changed by session"
+            " Were files joined, or was the machine changed meanwhile? Calibrate each by itself, or"
+            " find what changed by session"
         )
 
 
