@@ -1,4 +1,4 @@
-"""Keeps what somebody else has put into a file that the window writes."""
+"""Keep what somebody else has put into a file that the window writes."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def free_place(wanted: Path) -> Path:
 
 
 class Kept:
-    """What was written here; other contents are kept when these files are written again.
+    """Files that the window wrote; other contents are kept when it writes them again.
 
     A file with a seal says by itself whether it was changed. Of others, such as a printer's
     configuration, a process knows what it wrote.
@@ -31,7 +31,7 @@ class Kept:
 
     @contextmanager
     def aside(self, paths: Iterable[Path]) -> Iterator[list[str]]:
-        """Write these files within the block; at its end a sentence of each that was another's.
+        """Write these files within the block; yield sentences on those of somebody else.
 
         Its content is kept in the project's folder, where the window offers it: a machine as
         another machine, a table as measurements.

@@ -237,7 +237,7 @@ def _told_of_lost_connections() -> Iterator[None]:
 
 
 def _started() -> bool:
-    """Whether a person starts it."""
+    """Ask a person to start the machine."""
     try:
         return input(f"type {START} to move it: ").strip() == START
     except EOFError:

@@ -84,7 +84,7 @@ def breakeven(fit: Fit) -> tuple[Breakeven, ...]:
 
 
 def _kinds(names: list[str], chosen: Parameters) -> tuple[str, ...]:
-    """Names as wildcards, but of a kind of which some are stated: these do not count."""
+    """Wildcards for names; the names themselves of a kind of which some are stated."""
     geometry, asked = chosen.robot.geometry, chosen.asked.uncertainty
     stated = {*uncertain_names(asked, chosen.robot, ()), *_considered(chosen)}
     found = dict[str, None]()

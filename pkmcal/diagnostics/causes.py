@@ -55,7 +55,7 @@ def found_causes(found: Solution) -> tuple[FoundCause, ...]:
 
 
 def _of_instruments(found: Solution) -> tuple[FoundCause, ...]:
-    """Numbers of an instrument that would explain what a fit leaves that is no fit."""
+    """Numbers of an instrument that would explain the residuals of a bad fit."""
     sure = _explained(found, of_instruments_alone)
     return tuple(each for each in sure[:1] if each.chance < _CERTAIN)
 

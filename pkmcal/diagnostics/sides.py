@@ -1,4 +1,4 @@
-"""Whether one side of the workspace wants other numbers than the other.
+"""Test whether the two sides of the workspace fit better apart.
 
 A joint with play hangs to the side to which the platform leans, a rail is bowed, a probe tilts its
 nozzle: no column of a cause has the shape of each. That one model does not hold on both sides of

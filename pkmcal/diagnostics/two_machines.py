@@ -102,7 +102,7 @@ def apart(found: Solution) -> Apart | None:
 
 
 def equations_of_visits(found: Solution, visits: Visits) -> tuple[IntArray, IntArray]:
-    """Equations (u,) that outliers have no part in, and of which visit and component each is.
+    """Equations (u,) without outliers, and the visit and the component of each.
 
     Of mixtures each stands for itself: components of two poses are unlike.
     """

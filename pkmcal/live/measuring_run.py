@@ -35,7 +35,7 @@ class Stopped(Exception):
 
 @dataclass(frozen=True)
 class Rules:
-    """How poses are measured.
+    """Rules by which poses are measured.
 
     Attributes
     ----------
