@@ -67,9 +67,9 @@ class Apart:
     def __str__(self) -> str:
         if self.elsewhere:
             return (
-                f"{self.group}, measured at other places than the other rows, and these fit better"
-                f" apart: the residuals are then {self.residual:.2g} times as large"
-                f" ({chance_text(self.chance)}). The model misses something there, or the machine"
+                f"fitted apart, {self.group} and the other rows, which were measured at other"
+                f" places, leave residuals {self.residual:.2g} times as large"
+                f" ({chance_text(self.chance)}): the model misses something there, or the machine"
                 " was changed meanwhile; poses in another order would tell"
             )
         return (
