@@ -275,6 +275,23 @@ CALLS: dict[str, Call] = {
         {"robot": pk.load("linear-delta"), "points": [[0.0, 0.0, 0.2]], "offset": [0.0, 0.0, 0.0]},
         {"robot": "robot", "points": "numbers", "offset": "numbers"},
     ),
+    "from_pnp": (
+        pk.from_pnp,
+        {
+            "measurements": pk.Measurements([[500.0] * 6], [[0, 0, 900, 0, 0, 0]], "pose"),
+            "focal": 1000.0,
+            "board": (100.0, 80.0),
+            "on": "base",
+            "noise": 0.1,
+        },
+        {
+            "measurements": "measurements",
+            "focal": "number",
+            "board": "numbers",
+            "on": "word",
+            "noise": "number",
+        },
+    ),
     "locate_anchors": (
         pk.locate_anchors,
         {"robot": BELTS, "actuators": BELTS.inverse(BELTS.home + PLACES)},

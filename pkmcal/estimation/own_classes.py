@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -120,7 +121,8 @@ def _turned(
         else:
             place[:, k - 3] += change
         moved = np.hstack([place, orientation.turned(pose[:, 3:], vector)])
-        return reading.predict(replace(at, **{end: moved}), **numbers).values
+        there = replace(at, pose=moved) if end == "pose" else replace(at, other=moved)
+        return reading.predict(there, **numbers).values
 
     return values
 
@@ -160,22 +162,25 @@ def _compare_effect(
     numbers = prediction.arguments_of(i, theta)
     for machine, rows in prediction.machines_of(i, theta):
         at = table.pose_of[i][rows]
-        pose, actuators = evaluation.pose[at], table.actuators[at]
-
-        def moved(changed: Mapping[str, FloatArray]) -> Moved:
-            return effect.moved(machine, pose, actuators, rows, changed)  # noqa: B023
-
+        moved = partial(effect.moved, machine, evaluation.pose[at], table.actuators[at], rows)
         seen = moved(numbers)
         for name in seen.by.keys() & prediction.numbers[i].keys():
             for k in np.flatnonzero(steps[name]).tolist():
-                _compare(
-                    seen.by[name][:, :, k],
-                    lambda change, name=name, k=k: moved(_with(numbers, name, k, change)).twist,
-                    steps[name][k],
-                    np.subtract,
-                    (what, _TWIST, f"by[{name!r}], by number {k}"),
-                    rows,
-                )
+                names = what, _TWIST, f"by[{name!r}], by number {k}"
+                twists = partial(_twists, moved, numbers, name, k)
+                stated, step = seen.by[name][:, :, k], float(steps[name][k])
+                _compare(stated, twists, step, np.subtract, names, rows)
+
+
+def _twists(
+    moved: Callable[[Mapping[str, FloatArray]], Moved],
+    numbers: Mapping[str, FloatArray],
+    name: str,
+    k: int,
+    change: float,
+) -> FloatArray:
+    """The twists where one number of an argument has changed in all rows."""
+    return moved(_with(numbers, name, k, change)).twist
 
 
 def _compare_order(prediction: Prediction, i: int, evaluation: Evaluation) -> None:

@@ -98,9 +98,8 @@ def pictures(found: Solution) -> Iterator[CalibratedPicture]:
                 outlier = np.isin(data.rows[rows], odd)
                 for each in seen:
                     first = int(rows[each.row])
-                    named = data.measured.group is not None
                     yield CalibratedPicture(
-                        name=pose_name(data, first) if named else f"row {data.rows[first]}",
+                        name=pose_name(data, first),
                         use=use,
                         outliers=int(outlier[lot == lot[each.row]].sum()),
                         camera=getattr(instrument, "camera_name", ""),

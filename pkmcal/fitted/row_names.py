@@ -58,11 +58,11 @@ def _place(data: FitData, i: int) -> str:
 
 
 def pose_name(data: FitData, i: int) -> str:
-    """Name the pose of the row in place `i` of a set that has groups, by its number at least."""
+    """Name the pose of the row in place `i` of a set: by its name, its group, or this row."""
     measured = data.measured
     if measured.pose_name is not None:
         return printable(measured.pose_name[i])
-    return str(measured.group[i])
+    return f"row {data.rows[i]}" if measured.group is None else str(measured.group[i])
 
 
 def _target(data: FitData, i: int) -> list[str]:

@@ -1,6 +1,7 @@
 """Interfaces of a machine and of an instrument with which a measurement can be made.
 
-A kind of machine or instrument is one file with one class, named in `registry`.
+A kind of machine or instrument is one file with one class, named in `registry`. One that asks a
+person has ``ASKS = True`` and takes a third argument: what asks, a terminal or a page.
 """
 
 from __future__ import annotations

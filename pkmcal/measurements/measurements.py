@@ -207,7 +207,7 @@ class Measurements(Result):
         instrument = adapted(
             "Measurements", stated(kind, instrument), fields, OF_MEASUREMENTS, present
         )
-        require_other_columns(type(instrument), of_rows)
+        require_other_columns(type(instrument), of_rows)  # type: ignore[arg-type]
         q = numbers("actuators", actuators)
         if q.ndim not in (1, 2) or 0 in q.shape:
             raise ArgumentError(

@@ -21,6 +21,7 @@ from pkmcal.measurements.inverted import inverted
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.readings import twists
 from pkmcal.readings.boards import Board
+from pkmcal.readings.rows import numbers
 
 _CORNERS = 5  # along and down a stand-in board
 _SLANTING = np.radians(75.0)  # from the normal of the board, of lines of sight that end on it
@@ -104,7 +105,7 @@ def _corners(pose: FloatArray, board: Board | Sequence[float]) -> FloatArray:
     """Corners (K, 3) in axes of the board."""
     if isinstance(board, Board):
         return board.places
-    size = np.asarray(board, dtype=np.float64)
+    size = numbers("board", board)
     if size.shape != (2,) or not (size > 0.0).all():
         raise ArgumentError(f"board must be its width and height in mm, above 0; found {board!r}")
     side = np.linspace(-0.5, 0.5, _CORNERS)

@@ -382,7 +382,7 @@ class Camera(Reading):
             for each in (self.stands, self.carried)
         )
         board: FloatArray = stands @ screws.frames(np.ascontiguousarray(pose)) @ carried
-        return board if self.on == "base" else np.linalg.inv(board)
+        return board if self.on == "base" else np.asarray(np.linalg.inv(board), dtype=np.float64)
 
     def starts(self, machine: Any, sets: Sets, found: Starts) -> None:
         """Start at the platform; `places_seen` finds the place together with the frame."""

@@ -86,7 +86,7 @@ def _require_stated(reading: Reading, argument: str) -> None:
         raise ArgumentTypeError(
             f'{argument}: the class {of.__name__} has to state its name, as in name = "loop"'
         )
-    _require_fields(type(reading))
+    _require_fields(type(reading))  # type: ignore[arg-type]
     pairs = reading.components
     stated = isinstance(pairs, tuple) and all(
         isinstance(pair, tuple) and [*map(type, pair)] == [str, str] for pair in pairs

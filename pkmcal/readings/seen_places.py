@@ -21,6 +21,7 @@ from pkmcal.readings.hand_eye import of_frame_and_tool
 _FEWEST = 4  # pictures, more of which tell that they are mirrored
 _OFF, _FALLS = 0.1, 3.0  # rad by which mirrored pictures are off, and how many times less mirrored
 _STRANGE = 0.05  # of the extent of a board in a picture, by which its corners are off at most
+_MANY = 8  # corners of a picture that says whether it shows the board
 _DRAWN = 5  # pictures of a draw
 _DRAWS = 60
 _ROUNDS = 10  # of choosing and laying in turn
@@ -73,6 +74,9 @@ def tool_places(
                 f" {np.degrees(otherwise):.2g} deg with left and right exchanged; take"
                 " pictures without mirroring, or state u as the width less 1 less u"
             )
+    many = np.bincount(picture) >= _MANY
+    if many.sum() <= _FEWEST or disagreement(places[many], pose[many]) <= _OFF:
+        return places
     trials = {"with the camera on the other of base and platform": (not rides, pose)}
     for how, rows in (("next", 1), ("previous", -1)):
         trials[f"with the actuators of the {how} picture"] = rides, np.roll(pose, -rows, axis=0)
@@ -116,6 +120,10 @@ def _require_the_board(pixel: FloatArray, picture: IntArray, off: FloatArray) ->
     middle = np.stack([np.bincount(picture, each) for each in pixel.T], axis=1) / count[:, None]
     away = np.linalg.norm(pixel - middle[picture], axis=1)
     extent = 2.0 * np.sqrt(np.bincount(picture, away**2) / count)
+    many = count >= _MANY  # of fewer the search for their place may end elsewhere
+    if not many.any():
+        return
+    off, extent = off[many], extent[many]
     share = np.where(np.isfinite(off), off, np.inf) / extent
     if np.median(share) > _STRANGE:
         typical = float(np.median(off[np.isfinite(off)])) if np.isfinite(off).any() else np.inf

@@ -103,8 +103,9 @@ def met_exactly(residual: FloatArray, component: IntArray) -> BoolArray:
     [False, True, False, True]
     """
     size = np.abs(residual)
-    open_ones = np.bincount(component, size > _MET * size.max(initial=0.0))
-    met: BoolArray = open_ones[component] == 0.0
+    largest = size.max(initial=0.0)  # where all are 0, no component is unlike the others
+    open_ones = np.bincount(component, size > _MET * largest)
+    met: BoolArray = (open_ones[component] == 0.0) & (largest > 0.0)
     return met
 
 

@@ -40,7 +40,8 @@ def test_measurements_that_are_dropped_beside_the_machine_leave_it_there(tmp_pat
         take_hexapod(page)
         drop(page, "t.csv", POINTS)
         page.locator("#said", has_text="t.csv: measurements").wait_for()
-        assert page.url == f"http://127.0.0.1:{served.port}/"  # the browser did not open it
+        # the browser did not open it
+        assert page.url == f"http://127.0.0.1:{served.port}/#machine"
         text = (served.folder / "project.toml").read_text()
         assert 'builtin = "hexapod"' in text and 'files = ["t.csv"]' in text
 

@@ -202,7 +202,7 @@ def test_pictures_of_corners_in_a_line_place_nothing(sound: pk.Measurements) -> 
     row = np.arange(len(sound)) % len(BOARD.ids)
     values = np.where(((sound.group == 4) & (row > 5))[:, None], np.nan, sound.values)
     measured = replace(sound, values=values, actuator_sigma=0.0)
-    pose = np.repeat(pk.load("hexapod").home[None], len(sound), axis=0)
+    pose = pk.load("hexapod").forward(sound.actuators).pose
     seen = np.isfinite(measured.instrument.places_seen(measured, pose)).all(axis=1)
     assert not seen[sound.group == 4].any() and seen[sound.group == 5].any()
     found = pk.identify(pk.load("hexapod"), measured, free=[])
