@@ -234,7 +234,7 @@ def test_it_states_no_other_temperature_than_was_calibrated_with(
     stated = certificate.read(tmp_path / "stated.toml")
     if message is None:
         told = certificate.as_data(found, stated, np.empty(0), np.empty((0, 3)))
-        assert told["reference_temperature"].startswith("20 °C (ISO 1): the lengths stated are")
+        assert told["reference_temperature"].startswith("20 °C (ISO 1): the stated lengths are")
         sure = "± 1 µm/m/K" if "expansion_uncertainty" in text else "its uncertainty is not stated"
         assert told["expansion"] == f"base, platform, limbs 11.5 µm/m/K, {sure}"
         assert told["worst"] is None
