@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from itertools import chain, count
 from pathlib import Path
 
-from pkmcal.files.seal import has_seals, is_sealed
+from pkmcal.files.seal import is_sealed
 
 
 def free_place(wanted: Path) -> Path:
@@ -57,9 +57,7 @@ class Kept:
             self._own |= {_digest(each) for each in paths if each.is_file()}
 
     def _is_own(self, path: Path) -> bool:
-        if has_seals(path.suffix):
-            return is_sealed(path.read_bytes(), path.suffix)
-        return _digest(path) in self._own
+        return is_sealed(path.read_bytes(), path.suffix) or _digest(path) in self._own
 
 
 def _digest(path: Path) -> str:
