@@ -157,11 +157,11 @@ CHECKS = (
     ),
     Check(
         name="uninformative-poses",
-        about="what was read at some poses determines these poses at most", levels=("remark",),
+        about="readings at some poses determine at most the poses themselves", levels=("remark",),
         run=lambda found: at_most_one(found.idle or None),
         say=lambda found, count: (
-            f"{count} {'poses say' if count > 1 else 'pose says'} nothing: what was read there"
-            " determines the pose at most"
+            f"{count} {'poses add' if count > 1 else 'pose adds'} nothing: the readings there"
+            " determine at most the pose itself"
         ),
     ),
 )  # fmt: skip

@@ -67,16 +67,16 @@ class Apart:
     def __str__(self) -> str:
         if self.elsewhere:
             return (
-                f"{self.group}, measured at other places than the other rows, and these fit better"
-                f" with numbers of their own, {self.residual:.2g} times the residuals"
+                f"fitted apart, {self.group} and the other rows, which were measured at other"
+                f" places, leave residuals {self.residual:.2g} times as large"
                 f" ({chance_text(self.chance)}): the model misses something there, or the machine"
                 " was changed meanwhile; poses in another order would tell"
             )
         return (
-            f"{self.group} and the other rows are as if of two machines: with numbers of its own"
-            f" each has {self.residual:.2g} times the residuals ({chance_text(self.chance)}). Were"
-            " files joined, or was the machine changed meanwhile? Calibrate each by itself, or find"
-            " what changed by session"
+            f"{self.group} and the other rows seem to come from two machines: fitted apart, they"
+            f" leave residuals {self.residual:.2g} times as large ({chance_text(self.chance)})."
+            " Were files joined, or was the machine changed meanwhile? Calibrate each by itself, or"
+            " find what changed by session"
         )
 
 
@@ -102,7 +102,7 @@ def apart(found: Solution) -> Apart | None:
 
 
 def equations_of_visits(found: Solution, visits: Visits) -> tuple[IntArray, IntArray]:
-    """Equations (u,) that outliers have no part in, and of which visit and component each is.
+    """Equations (u,) without outliers, and the visit and the component of each.
 
     Of mixtures each stands for itself: components of two poses are unlike.
     """

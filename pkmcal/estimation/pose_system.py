@@ -98,7 +98,7 @@ class PoseSystem:
         closures: FloatArray | None,
         readings: FloatArray | None = None,
     ) -> FloatArray:
-        """What is left (M, d) of changes of closures (K, e, d) and of readings (R, d), whitened.
+        """Remainder (M, d) of changes of closures (K, e, d) and of readings (R, d), whitened.
 
         One of them may be None: it does not change. Signs are those of `by_parameters`.
         """

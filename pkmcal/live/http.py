@@ -111,7 +111,7 @@ class Server:
 
 
 def _said(error: urllib.error.HTTPError) -> str:
-    """What a server says of its error, in its own words where it has some."""
+    """Text of a server's error, in its own words where it has some."""
     body = error.read(_LONGEST).decode("utf-8", "replace")
     try:
         message = json.loads(body)["error"]["message"]
