@@ -41,6 +41,7 @@ from pkmcal.planning.planned import UNKNOWN
 from pkmcal.readings.registry import Kind
 
 _RINGS = 8  # of places on the bed
+_WHOLE = 1e-3  # mm, of the places that a probe goes to
 DRAWN, _SHARE = 500, 0.9  # candidates where none are given, and how far out they reach
 
 
@@ -318,7 +319,7 @@ def _on_bed(machine: Robot | SerialArm) -> FloatArray:
         turns = 2.0 * np.pi * np.arange(6 * ring) / (6 * ring)
         rings.append(min(ends) * ring / _RINGS * np.stack([np.cos(turns), np.sin(turns)], axis=1))
     poses = np.zeros((sum(map(len, rings)), 6))
-    poses[:, :2] = np.concatenate(rings)
+    poses[:, :2] = np.trunc(np.concatenate(rings) / _WHOLE) * _WHOLE  # no rounding leads beyond it
     reached: FloatArray = poses[good_poses(machine, poses)]
     if not len(reached):
         raise ArgumentError(f"--kind probe: {machine.name} reaches nothing of its bed at z = 0")

@@ -370,6 +370,6 @@ class Design:
 
 
 def _times(blocks: FloatArray, matrix: FloatArray) -> FloatArray:
-    """Blocks (N, k, n) times a matrix (n, n), in one product, which takes less time than N."""
-    product: FloatArray = (blocks.reshape(-1, len(matrix)) @ matrix).reshape(*blocks.shape[:2], -1)
-    return product
+    """Blocks (..., n) times a matrix (n, m), in one product, which takes less time than many."""
+    product: FloatArray = blocks.reshape(-1, len(matrix)) @ matrix
+    return product.reshape(*blocks.shape[:-1], -1)
