@@ -127,7 +127,8 @@ CHECKS = (
     Check(
         name="weak-combinations",
         about="combinations of numbers are so weak that the search kept what they had",
-        at_once=True, run=lambda found: at_most_one(_kept(found) or None), say=_kept_text,
+        unless=("other-modes",), at_once=True,
+        run=lambda found: at_most_one(_kept(found) or None), say=_kept_text,
         remedies=lambda found, _: (Remedy("prior"),),
     ),
     Check(

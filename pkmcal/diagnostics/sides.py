@@ -14,7 +14,7 @@ import numpy as np
 
 from pkmcal.arrays import BoolArray
 from pkmcal.diagnostics.check import Check, Level, at_most_one
-from pkmcal.diagnostics.two_machines import equations_of_visits, tested
+from pkmcal.diagnostics.two_machines import equations_of_visits, fit_of, tested
 from pkmcal.diagnostics.visits import visits_of
 from pkmcal.display import chance_text
 from pkmcal.fitted.solution import Solution
@@ -69,7 +69,7 @@ def sides(found: Solution) -> Sides | None:
         return None
     groups = dict(_groups(found))
     use, key = equations_of_visits(found, visits_of(found))
-    known = tested(found, groups, use, key) if groups else {}
+    known = tested(found, fit_of(found), groups, use, key) if groups else {}
     if not known:
         return None
     where = min(known, key=lambda each: known[each].chance)
