@@ -125,7 +125,7 @@ def _at_odds(found: Solution) -> tuple[AtOdds, ...]:
             if np.isfinite(picture.off)
         ]
         if len(within) >= _FEW:
-            best, off = float(np.median(within)), float(np.hypot(*found.component_noise[i]))
+            best, off = float(np.median(within)), float(np.linalg.norm(found.component_noise[i]))
             if off > _WORSE * best:
                 own = data.measured.instrument
                 words = (getattr(own, word, "") for word in ("camera_name", "board_name"))
