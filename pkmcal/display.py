@@ -83,6 +83,17 @@ def with_uncertainty(value: float, sigma: float) -> str:
     return f"{rounded(value, places)} ± {fixed(abs(sigma), places)}"
 
 
+def changed(value: float, start: float, unit: str) -> float:
+    """Return how far a number is from where it was; of an angle the shorter way round.
+
+    Examples
+    --------
+    >>> round(changed(-3.1, 3.1, "rad"), 3)  # through 180 deg
+    0.083
+    """
+    return math.remainder(value - start, math.tau) if unit == "rad" else value - start
+
+
 def displayed(value: float, unit: str) -> tuple[float, str]:
     """A number in the unit people read: rad in degrees, everything else as it is.
 

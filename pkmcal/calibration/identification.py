@@ -23,7 +23,7 @@ from pkmcal.diagnostics.law_tests import LawTest, law_tests
 from pkmcal.diagnostics.measuring_order import MeasuringOrder
 from pkmcal.diagnostics.moved import Moved
 from pkmcal.diagnostics.verdict import Verdict, diagnose
-from pkmcal.display import Table
+from pkmcal.display import Table, changed
 from pkmcal.effects.expansion import in_words as heat_in_words
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.fitted.held_numbers import considered_places
@@ -145,7 +145,7 @@ class Identification(Solution[Machine], Result):
             "value": self.values,
             "stderr": self.stderr,
             "start": self.start,
-            "change": self.values - self.start,
+            "change": np.array([*map(changed, self.values, self.start, self.units)]),
         }
 
     @cached_property

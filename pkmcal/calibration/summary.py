@@ -284,7 +284,7 @@ def parameter_rows(table: Solution) -> Iterator[str | Table]:
     ):
         number, shown_unit = display.displayed(float(value), unit)
         deviation, _ = display.displayed(float(sigma), unit)
-        change, _ = display.displayed(float(value - start), unit)
+        change, _ = display.displayed(display.changed(float(value), float(start), unit), unit)
         places = display.decimals(deviation) if np.isfinite(deviation) else 4
         label = f"{name} [{shown_unit}]"
         text = display.with_uncertainty(number, deviation)

@@ -8,12 +8,14 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray
 from pkmcal.diagnostics.check import Check, at_most_one
+from pkmcal.fitted.instruments import instruments, parts_of
 from pkmcal.fitted.solution import Solution
 from pkmcal.readings import orientation
 
 _ANGLES = ("alpha", "beta", "gamma")
 _LITTLE = np.radians(1.5)  # of turning about the second axis, rms, below which the poses are alike
 _FEW = 3  # poses
+_WORSE = 4.0  # times what corners are off within pictures, at which the fit contradicts them
 
 
 @dataclass(frozen=True)
@@ -86,6 +88,61 @@ def _doubted(found: Solution) -> tuple[str, ...]:
     )
 
 
+@dataclass(frozen=True)
+class AtOdds:
+    """Pictures that agree each with themselves, and not with what else was measured.
+
+    Attributes
+    ----------
+    name : str
+        Of their measurements.
+    within, off : float
+        How far corners are off where the board is best laid in each picture, the median, and what
+        the fit finds of them as noise, px.
+    """
+
+    name: str
+    within: float
+    off: float
+
+
+def _at_odds(found: Solution) -> tuple[AtOdds, ...]:
+    """List pictures that the fit weighs little for what other measurements say."""
+    equations, _, end, *_ = next(iter(parts_of(found)))
+    sets = equations.prediction.datasets
+    if len(sets) < 2:
+        return ()
+    odd = []
+    for i, data in enumerate(sets):
+        within = [
+            picture.off
+            for rows, instrument in instruments(equations, end.theta, i)
+            for picture in instrument.pictures(
+                data.measured.select(rows),
+                end.pose[equations.table.pose_of[i][rows]],
+                end.residuals[i][rows],
+            )
+            if np.isfinite(picture.off)
+        ]
+        if len(within) >= _FEW:
+            best, off = float(np.median(within)), float(np.linalg.norm(found.component_noise[i]))
+            if off > _WORSE * best:
+                own = data.measured.instrument
+                words = (getattr(own, word, "") for word in ("camera_name", "board_name"))
+                name = ", ".join(filter(None, words)) or f"data set {data.set_name or i}"
+                odd.append(AtOdds(name, best, off))
+    return tuple(odd)
+
+
+def _said_of(found: Solution, seen: AtOdds) -> str:
+    return (
+        f"pictures of {seen.name}: each fits its board within {seen.within:.2g} px, and all are"
+        f" {seen.off:.2g} px off where other measurements say that the machine was: the lens, the"
+        " board or the actuators of these pictures are others; they hardly count, and calibrated by"
+        " themselves tell more"
+    )
+
+
 def scale_by_one(found: Solution) -> str | None:
     """Name the one thing that tells how large the machine is; None where there are several."""
     machine = found.fit.end.robot
@@ -112,6 +169,11 @@ CHECKS = (
     Check(
         name="doubtful-readings", about="readings that contradict what is stated of the instrument",
         levels=("doubt",), run=_doubted, say=lambda found, text: text,
+    ),
+    Check(
+        name="at-odds", about="pictures of one of several cameras that the other measurements"
+        " contradict",
+        levels=("doubt",), run=_at_odds, say=_said_of,
     ),
     Check(
         name="scale", about="one thing of stated size that alone tells how large the machine is",

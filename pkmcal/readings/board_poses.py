@@ -22,6 +22,7 @@ from pkmcal.statistics.distributions import f_tail
 _FEWEST = 4  # corners of a picture that tell where a flat board is; of another one two more
 _UNBENDING = 20  # rounds of undoing the distortion
 _STEPS = 30  # of Levenberg and Marquardt
+_DAMPED = 1e-12  # at least, so that corners in a point or a line have a step
 _SMALL = 1e-10  # step, as a share of the distance and in rad, at which a place is found
 _SAME = 1e-4  # turning between two places, rad, below which they are one
 _LINE = 0.01  # square across over along, at which corners of a picture are in a line
@@ -67,9 +68,12 @@ def board_poses(
         Which picture each is of, 0 … P - 1. Four corners of a flat board, or six, are needed.
     """
     lens = np.broadcast_to(lens, (len(pixel), 9)).copy()
+    direction = unbent(pixel, lens)
+    folded = ~np.isfinite(direction).all(axis=1)  # with a lens of other pictures: a guess will do
+    direction[folded] = (pixel[folded] - lens[folded, 2:4]) / lens[folded, :2]
     found = [
         _refined(guess, corner, pixel, lens, picture)
-        for guess in _guessed(corner, unbent(pixel, lens), picture)
+        for guess in _guessed(corner, direction, picture)
     ]
     pose, rms = (np.stack(each, axis=1) for each in zip(*found, strict=True))
     turn = orientation.between(pose[:, 1, 3:], pose[:, 0, 3:])
@@ -251,10 +255,11 @@ def _refined(
     for _ in range(_STEPS):
         if not len(moving):
             break
-        own = normal[moving]
-        diagonal = np.einsum("pii->pi", own)
-        damped = own + damping[moving, None, None] * (np.eye(6) * diagonal[:, None])
-        step = np.linalg.solve(damped, pull[moving, :, None])[:, :, 0]
+        size = np.sqrt(np.einsum("pii->pi", normal[moving]))
+        size[~(size > 0.0)] = 1.0
+        scaled = normal[moving] / (size[:, :, None] * size[:, None, :])
+        damped = scaled + damping[moving, None, None] * np.eye(6)
+        step = np.linalg.solve(damped, (pull[moving] / size)[:, :, None])[:, :, 0] / size
         trial = _moved(pose[moving], step)
         rows = np.flatnonzero(np.isin(picture, moving))
         among = np.searchsorted(moving, picture[rows])
@@ -263,7 +268,7 @@ def _refined(
         pose[moving[better]] = trial[better]
         for now, then in zip((cost, normal, pull), new, strict=True):
             now[moving[better]] = then[better]
-        damping[moving] *= np.where(better, 0.1, 10.0)
+        damping[moving] = np.maximum(damping[moving] * np.where(better, 0.1, 10.0), _DAMPED)
         small = np.abs(step[:, :3]).max(axis=1) < _SMALL
         moving = moving[~(small | (damping[moving] > 1e12))]
     count = np.bincount(picture, minlength=len(pose))

@@ -19,7 +19,10 @@ _MIDDLE = 0.1  # share of a picture by which the principal point is off its midd
 _STEPS = 6  # towards a better lens
 _FEWEST = 4  # corners of a picture that tells something of it
 _TOLD = 1e-6  # of the largest singular value, from which combinations of its numbers are told
+_FITS = 1.5  # times less that corners are off with a lens that fits as well as the best one
+_AS_WELL = 1.1  # times what corners are off with the best one
 _EXCHANGED = (1, 0, 3, 2, 4, 5, 7, 6, 8)  # numbers of a lens where x is y
+_SCALES = (1 / 4, 1 / 3, 1 / 2, 2 / 3, 3 / 4, 4 / 3, 3 / 2, 2, 3, 4)  # of pictures made smaller
 
 
 def lens_doubts(
@@ -56,20 +59,25 @@ def lens_doubts(
                 f" distortion of the lens and {flat:.3g} px without; state the lens of rectified"
                 " pictures, without distortion"
             )
-    ends = np.array([end or 1.0 + most for end, most in zip(size, pixel.max(axis=0), strict=True)])
-    if (np.abs(lens[2:4] / ends - 0.5) > _MIDDLE).any():
-        turned = _typical(board_poses(corner, pixel, lens[list(_EXCHANGED)], picture))
-        if turned * _FALLS < max(off, _CLEAR):
-            said = True
-            yield (
-                f"the lens is that of turned pictures: its middle {lens[2]:.0f}, {lens[3]:.0f} is"
-                f" far from that of pixels up to {ends[0]:.0f}, {ends[1]:.0f}, and with x and y"
-                f" exchanged corners are {turned:.3g} px off in place of {off:.3g}; exchange fx and"
-                " fy, cx and cy, p1 and p2, or turn the pictures as the lens was calibrated"
-            )
-    if off > _CLEAR and not said:
+    most = pixel.max(axis=0)
+    ends = np.array([end or 1.0 + last for end, last in zip(size, most, strict=True)])
+    if (off > _CLEAR and not said) or (np.abs(lens[2:4] / ends - 0.5) > _MIDDLE).any():
         other, least = _better(corner, pixel, lens, picture, found)
-        if least * _FALLS < off:
+        others = dict(_kindred(lens, size))
+        tried = {
+            how: _typical(board_poses(corner, pixel, each, picture)) for how, each in others.items()
+        }
+        how = min(tried, key=lambda each: tried[each])
+        left = tried[how]
+        fits = left * _FITS < off and left < _AS_WELL * least
+        if left * _FALLS < max(off, _CLEAR) or fits:
+            yield (
+                f"the lens is that of {how.partition(':')[0]} pictures: its middle is at"
+                f" {lens[2]:.0f}, {lens[3]:.0f} and pixels reach {most[0]:.0f}, {most[1]:.0f};"
+                f" {how.partition(': ')[2]} corners are {left:.3g} px off in place of {off:.3g}:"
+                " state the lens of these pictures, or give them as the lens was calibrated"
+            )
+        elif off > _CLEAR and not said and least * _FALLS < off:
             numbers = ", ".join(
                 f"{name} {value:.4g}" for name, value in zip(LENS, other, strict=True) if value
             )
@@ -84,6 +92,31 @@ def lens_doubts(
             f"the board is seen from behind in {behind} of {len(found.pose)} pictures: pictures are"
             " mirrored, or corners numbered from the other side; places on the board are mirrored"
             " then, and with mirrored pictures nothing fits"
+        )
+
+
+def _kindred(lens: FloatArray, size: tuple[int, int]) -> Iterator[tuple[str, FloatArray]]:
+    """Lenses (9,) of the same pictures, turned or of another size, by what they are and how.
+
+    Of pictures of unknown size the middle of the lens is taken for their middle.
+    """
+    fx, fy, cx, cy, k1, k2, p1, p2, k3 = lens.tolist()
+    right, low = (
+        (end or 2.0 * middle + 1.0) - 1.0 for end, middle in zip(size, (cx, cy), strict=True)
+    )
+    turned = {
+        "turned: turned by 90 deg to the right": (fy, fx, low - cy, cx, p2, -p1),
+        "turned: turned by 90 deg to the left": (fy, fx, cy, right - cx, -p2, p1),
+        "turned: upside down": (fx, fy, right - cx, low - cy, -p1, -p2),
+    }
+    yield "turned: with x and y exchanged", lens[list(_EXCHANGED)]
+    for how, (*focal, p, q) in turned.items():
+        yield how, np.array([*focal, k1, k2, p, q, k3])
+    for scale in _SCALES:
+        middle = (lens[2:4] + 0.5) * scale - 0.5
+        yield (
+            f"larger or smaller: with the lens times {scale:.3g}",
+            np.concatenate([lens[:2] * scale, middle, lens[4:]]),
         )
 
 

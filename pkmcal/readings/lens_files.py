@@ -20,7 +20,11 @@ from pkmcal.exceptions import FileError
 from pkmcal.files.atomic import write_whole
 
 _MATRIX = ("camera_matrix", "cameramatrix", "k", "m1", "intrinsic_matrix")
-_BENT = ("distortion_coefficients", "distcoeffs", "dist_coeffs", "dist_coeff", "d", "d1")
+_BENT = (
+    "distortion_coefficients", "distortion_coeffs", "distcoeffs", "dist_coeffs", "dist_coeff",
+    "dist_coefs", "distortion", "dist", "d", "d1",
+)  # fmt: skip
+_FISHEYE = "fisheye_model"  # of OpenCV's example of a calibration, beside its own four numbers
 _MODEL = ("distortion_model", "camera_model")
 _PLAIN = ("", "plumb_bob", "pinhole", "radtan", "brown", "opencv")
 _SIGMA = (
@@ -33,10 +37,12 @@ _SIGMA_OF_PARTS = (("cameramatrix_std_dev", 4), ("dist_coeffs_std_dev", 5))
 _COVARIANCE = "lens_covariance"
 _RESOLUTION = "cameraresolution"  # of OpenCV's interactive calibration: width and height
 _SIZE = {"width": ("image_width", "width"), "height": ("image_height", "height")}
+_DATA = ("data", "matrix", "")  # where numbers of a matrix are; "": in the lines below its name
 _APART = 1e-6  # of two focal lengths in proportion, by which they differ nevertheless
 _NAMES = ("k1", "k2", "p1", "p2", "k3")
 _ENTRY = re.compile(r"^(?P<indent> *)(?:- )?(?P<name>[A-Za-z_][\w. -]*?) *: *(?P<rest>.*)$")
-_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+_NUMBER = re.compile(r"[-+]?(?:\.?(?:nan|inf)\b|(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)", re.IGNORECASE)
+_NOTHING = ("", "None", "null", "~")
 
 
 def read_lens(path: str | PathLike[str]) -> dict[str, Any]:
@@ -69,7 +75,17 @@ def read_lens(path: str | PathLike[str]) -> dict[str, Any]:
             f"{file}: distortion model {model!r}: only the numbers k1 k2 p1 p2 k3 of OpenCV are"
             " supported; rectify the images and state the lens of the rectified ones"
         )
-    matrix = _numbers(_first(known, _MATRIX))
+    if any(_numbers(known.get(_FISHEYE))):
+        raise FileError(
+            f"{file}: the lens is a fisheye, which the numbers k1 k2 p1 p2 k3 of OpenCV do not"
+            " describe; rectify the images and state the lens of the rectified ones"
+        )
+    if "m1" in known and "m2" in known:
+        raise FileError(
+            f"{file}: M1 and M2: two cameras; write a file for each, with camera_matrix and"
+            " distortion_coefficients"
+        )
+    matrix = _list(known, _MATRIX, str(file))
     if len(matrix) != 9:
         raise FileError(
             f"{file}: expected a camera matrix of 9 numbers under {', '.join(_MATRIX[:3])}; found"
@@ -80,7 +96,14 @@ def read_lens(path: str | PathLike[str]) -> dict[str, Any]:
             f"{file}: the camera matrix must have focal lengths above 0 and no skew; found"
             f" {matrix[0]:g}, {matrix[4]:g} and {matrix[1]:g}"
         )
-    bent = _numbers(_first(known, _BENT))
+    if not any(matrix[i] for i in (2, 5)) and any(matrix[6:8]):  # column by column: Open3D
+        matrix = np.reshape(matrix, (3, 3)).T.ravel().tolist()
+    if matrix[6:] != [0.0, 0.0, 1.0]:
+        raise FileError(
+            f"{file}: the last row of the camera matrix must be 0, 0, 1; found"
+            f" {', '.join(f'{each:g}' for each in matrix[6:])}"
+        )
+    bent = _distortion(known, str(file))
     if np.any(np.asarray(bent[5:]) != 0.0):
         raise FileError(
             f"{file}: {len(bent)} distortion coefficients (rational, thin prism or tilted): only k1"
@@ -99,6 +122,31 @@ def read_lens(path: str | PathLike[str]) -> dict[str, Any]:
         lens = {"width": int(resolution[0]), "height": int(resolution[1])} | lens
     sigma = _sigma(known, str(file))
     return lens if sigma is None else lens | {"lens_sigma": sigma}
+
+
+def _distortion(known: Mapping[str, Any], file: str) -> list[float]:
+    """Numbers of the distortion; none is stated only where nothing is called so."""
+    words = (*_BENT, *_MODEL, *(name for name, _ in _SIGMA_OF_PARTS))
+    strange = [name for name in known if name.startswith("dist") and name not in words]
+    if strange and not any(name in known for name in _BENT):
+        raise FileError(
+            f"{file}: {strange[0]}: distortion is read under {', '.join(_BENT[:3])}; rename it"
+        )
+    return _list(known, _BENT, file)
+
+
+def _list(known: Mapping[str, Any], names: tuple[str, ...], file: str) -> list[float]:
+    """Return numbers under the first of several names, which must be numbers and no more."""
+    name = next((each for each in names if each in known), "")
+    value = known.get(name)
+    inner = _first(value, _DATA) if isinstance(value, Mapping) else value
+    rest = _NUMBER.sub("", str(inner)).strip(" []{}()-,;'\"")
+    found = _numbers(value)
+    if (value and inner is None) or rest not in _NOTHING or not np.isfinite(found).all():
+        raise FileError(
+            f"{file}: {name}: expected a list of finite numbers; found {str(value)[:60]}"
+        )
+    return found
 
 
 def _sigma(known: Mapping[str, Any], file: str) -> FloatArray | None:
@@ -177,11 +225,11 @@ def _numbers(value: Any) -> list[float]:
     if value is None:
         return []
     if isinstance(value, Mapping):
-        return _numbers(next((value[name] for name in ("data", "matrix") if name in value), None))
+        return _numbers(_first(value, _DATA))
     if isinstance(value, list):
         return [number for each in value for number in _numbers(each)]
     if isinstance(value, str):
-        return [float(each) for each in _NUMBER.findall(value)]
+        return [float(re.sub(r"\.(?=[a-zA-Z])", "", each)) for each in _NUMBER.findall(value)]
     return [float(value)]
 
 

@@ -46,6 +46,19 @@ def test_a_camera_as_found_sees_with_the_machine_as_found_what_the_fit_predicts(
     np.testing.assert_allclose(residual, found.residuals[0][read], atol=1e-6)
 
 
+def test_angles_change_the_shorter_way_round(found: pk.Identification) -> None:
+    """A board that looks up starts at half a turn, and ends on either side of it."""
+    start = np.where(np.array(found.units) == "rad", found.values + 6.2, found.start)
+    turned = replace(found, start=start)
+    columns = turned._columns()
+    told = dict(zip(columns["name"], columns["change"].tolist(), strict=True))
+    angles = [name for name, unit in zip(found.free, found.units, strict=True) if unit == "rad"]
+    assert angles and all(abs(told[name] - (2 * np.pi - 6.2)) < 1e-9 for name in angles)
+    i = found.free.index("offset1")
+    assert told["offset1"] == found.values[i] - found.start[i]
+    assert "-355" not in str(turned)
+
+
 def test_lens_and_size_that_were_found_are_those_of_the_instrument(sound: pk.Measurements) -> None:
     measured = with_lens(sound, lens="focal", find_size=True, fx=1495.0)
     free = fitted(measured)

@@ -92,6 +92,17 @@ def test_two_cameras_and_two_boards_tell_more_than_one() -> None:
     assert np.std(pulled[1], axis=0)[:3].max() < np.std(pulled[0], axis=0)[:3].max()
 
 
+def test_a_camera_with_the_lens_of_another_is_named_beside_one_that_is_sound() -> None:
+    """Its pictures are taken for bad ones: the fit weighs them little, and ends at the other's."""
+    _, sets = drawn([("left", "plate"), ("right", "plate")])
+    checks = [each.check for each in fitted(sets).verdict.said]
+    assert "at-odds" not in checks
+    other = replace(sets[1].instrument, fx=1000.0, fy=1000.0)
+    found = fitted([sets[0], replace(sets[1], instrument=other)])
+    (said,) = (each for each in found.verdict.said if each.check == "at-odds")
+    assert found.verdict.state == "doubtful" and said.text.startswith("pictures of right")
+
+
 def test_a_camera_on_the_platform_and_one_on_the_base_are_told_apart() -> None:
     _, sets = drawn([("left", "plate")])
     unnamed = [replace(each, instrument=replace(each.instrument, camera_name="")) for each in sets]

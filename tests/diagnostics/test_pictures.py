@@ -96,6 +96,36 @@ def test_the_lens_of_turned_pictures_is_said(sound: pk.Measurements) -> None:
     assert "turned pictures" in doubts(unknown_size)
 
 
+@pytest.mark.parametrize("way", ["right", "left"])
+@pytest.mark.parametrize("known", [True, False])
+def test_turned_pictures_are_named_so_and_no_distortion(
+    sound: pk.Measurements, way: str, known: bool
+) -> None:
+    """What corners are off with the lens as it was is little; that turned it fits is a reason."""
+    u, v = sound.values.T
+    ends = {"right": (LENS["height"] - 1 - v, u), "left": (v, LENS["width"] - 1 - u)}
+    turned = replace(sound, values=np.column_stack(ends[way]))
+    said = doubts(turned if known else with_lens(turned, width=0, height=0))
+    assert "that of turned pictures" in said and "another (" not in said
+
+
+@pytest.mark.parametrize("scale", [0.5, 2 / 3, 2.0])
+def test_the_lens_of_pictures_of_another_size_is_named_so(
+    sound: pk.Measurements, scale: float
+) -> None:
+    smaller = replace(sound, values=(sound.values + 0.5) * scale - 0.5)
+    assert f"with the lens times {scale:.3g} corners" in doubts(smaller)
+
+
+def test_pictures_that_a_lens_folds_are_refused_as_not_showing_the_board(
+    sound: pk.Measurements,
+) -> None:
+    """Beyond where a distortion folds no direction belongs to a pixel: the search begins beside."""
+    folded = with_lens(sound, k1=-2.5)
+    with pytest.raises(pk.ArgumentError, match="the lens of these pictures"):
+        pk.identify(pk.load("hexapod"), folded, free=[])
+
+
 def test_mirrored_pictures_and_numbers_from_the_other_side_are_said(sound: pk.Measurements) -> None:
     """With numbers from the other side the same fits: the board then is turned by half a turn."""
     width = LENS["width"]
