@@ -174,7 +174,7 @@ class CompressedPrediction(Prediction):
     whitening: Whitening
     lots: tuple[RowsInLots | None, ...]
 
-    @cached_property
+    @property
     def guess(self) -> RowStates:
         """Where a search for the poses begins."""
         return self.whole.guess
