@@ -299,20 +299,29 @@ CAUSES = (
 
 
 def possible(fit: Fit) -> Iterator[tuple[Cause, Columns]]:
-    """The causes that there may be in this fit, and their columns."""
+    """All causes and their columns in this fit."""
     yield from _with_columns(fit, (*CAUSES, *_of_instruments(fit), *_of_arm(fit)))
 
 
 def of_instruments_alone(fit: Fit) -> Iterator[tuple[Cause, Columns]]:
-    """The causes of instruments that there may be in this fit, and their columns."""
+    """The causes of instruments and their columns in this fit."""
     yield from _with_columns(fit, _of_instruments(fit))
 
 
 def _with_columns(fit: Fit, several: Iterable[Cause]) -> Iterator[tuple[Cause, Columns]]:
     for cause in several:
-        columns = cause.columns(fit)
-        if columns is not None:
-            yield cause, columns
+        yield cause, _made_anew(cause, fit)
+
+
+def _made_anew(cause: Cause, fit: Fit) -> Columns:
+    """Columns of a cause that hold nothing between passes; none where it cannot be."""
+
+    def columns() -> Iterator[tuple[slice, FloatArray]]:
+        own = cause.columns(fit)
+        if own is not None:
+            yield from own()
+
+    return columns
 
 
 def usable(end: Evaluation) -> bool:

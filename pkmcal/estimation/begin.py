@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.estimator import Estimator
@@ -26,6 +27,8 @@ def begun(
     better = in_least_minima(equations.with_parameters(start.parameters).fewest, own)
     if better is not own:
         start = exact.start(states=better.onward)
+    if start.ok:  # what it began with is needed of rows that failed alone, and takes memory
+        start = replace(start, begun=start.states)
     equations = equations.with_parameters(start.parameters)
     return equations, equations.with_exact_actuators(), start
 

@@ -174,7 +174,7 @@ class CompressedPrediction(Prediction):
     whitening: Whitening
     lots: tuple[RowsInLots | None, ...]
 
-    @cached_property
+    @property
     def guess(self) -> RowStates:
         """Poses at which a search for the poses begins."""
         return self.whole.guess

@@ -88,14 +88,21 @@ def _of_readings(equations: Equations) -> Labels:
     read = equations.whitening.present
     row = np.concatenate(rows)[read]
     return Labels(
-        set_of=equations.table.set_of[row],
+        set_of=_once(equations.table.set_of[row]),
         row=row,
         pose=poses_of_rows(equations)[row],
-        target=np.concatenate(targets)[read],
+        target=_once(np.concatenate(targets)[read]),
         component=np.concatenate(components)[read],
-        family=np.concatenate(families)[read],
+        family=_once(np.concatenate(families)[read]),
         length=np.concatenate(lengths)[read],
     )
+
+
+def _once(numbers: IntArray) -> IntArray:
+    """The numbers (M,), which are in memory once where all are the same."""
+    if not (numbers == numbers[:1]).all():
+        return numbers
+    return np.broadcast_to(numbers[:1].copy(), numbers.shape)
 
 
 def _of_mixtures(equations: Equations) -> Labels:

@@ -116,6 +116,8 @@ class Search:
         if same and _same(u, trail.u):
             return trail
         there = self.equations.at(self._theta(u), noise, trail.near)
+        if there.ok:  # what it began with is needed of rows that failed alone, and takes memory
+            there = replace(there, begun=there.states)
         count = trail.evaluations + 1
         return replace(trail, u=u.copy(), noise=noise, here=there, evaluations=count)
 

@@ -112,7 +112,7 @@ class Prediction:
                 _collect(found, i, columns["tool"][:, 0])
         return found
 
-    @cached_property
+    @property
     def guess(self) -> RowStates:
         """Return the start of a search for the poses: home, or the poses that were read."""
         table = self.table
@@ -242,7 +242,7 @@ class Prediction:
         numbers, by = self.arguments_of(i, theta), dict(predicted.by)
         change = np.zeros(predicted.values.shape)
         for effect in effects:
-            for machine, rows in self.machines_of(i, theta):
+            for machine, rows in self._machines_of_lots(i, theta):
                 for place, by_twist in places:
                     at = place[rows]
                     found = effect.moved(machine, pose[at], table.actuators[at], rows, numbers)
@@ -279,6 +279,14 @@ class Prediction:
         for machine in np.unique(machine_of_row):
             values = p.values_at(theta, table.machine_columns[machine])
             yield p.robot.with_values(values), np.flatnonzero(machine_of_row == machine)
+
+    def _machines_of_lots(
+        self, i: int, theta: FloatArray
+    ) -> Iterator[tuple[Calibratable, IntArray]]:
+        """`machines_of` with lots of the rows of each: effects then hold little of them."""
+        for machine, rows in self.machines_of(i, theta):
+            for lot in lots(len(rows)):
+                yield machine, rows[lot]
 
     # derivatives by the parameters ----------------------------------------------------------------
 

@@ -248,7 +248,8 @@ class Uncertainty:
     @cached_property
     def _place(self) -> IntArray:
         """Component of its row for each equation (M,)."""
-        return component_of(self.equations)
+        place = component_of(self.equations)
+        return self.labels.component if np.array_equal(place, self.labels.component) else place
 
     def freedom_of_noise(self, shares: FloatArray) -> float:
         """Degrees of freedom of a variance of which groups make these shares (G,).

@@ -88,9 +88,9 @@ class LinearFit:
         frame that is found meets as well: no noise, and no degrees of freedom.
         """
         met = met_exactly(self.residual[use], self.component[use])
-        still = (self.residual[use] == 0.0) & ~(self.design[use] != 0.0).any(axis=1)
-        idle = met | still
-        kept: IntArray = use[~idle]
+        still = self.residual[use] == 0.0
+        still[still] = ~(self.design[use[still]] != 0.0).any(axis=1)  # few: no copy of the design
+        kept: IntArray = use[~(met | still)]
         return kept
 
 
@@ -225,9 +225,14 @@ def in_unit_basis(
         residual=residual,
         prior=prior @ back,
         back=back,
-        cluster=np.unique(cluster, return_inverse=True)[1].reshape(-1),
+        cluster=_shared(np.unique(cluster, return_inverse=True)[1].reshape(-1), cluster),
         component=component,
     )
+
+
+def _shared(numbers: IntArray, known: IntArray) -> IntArray:
+    """Return `known` where it has these numbers, so that they are in memory once."""
+    return known if np.array_equal(numbers, known) else numbers
 
 
 def unit_basis(jacobian: FloatArray, prior: FloatArray, basis: FloatArray) -> FloatArray:

@@ -23,7 +23,8 @@ from pkmcal.statistics.linear_fit import LinearFit
 _SAME = 1e-6  # share of a column that must be left beside the parameters
 
 # Derivatives of the predicted values to held numbers, whitened: equations in their order, and their
-# rows (b, d). They are made anew for each pass: all at once may be larger than the design.
+# rows (b, d). They are made anew for each pass: all at once may be larger than the design. Numbers
+# that cannot be have none.
 Columns = Callable[[], Iterator[tuple[slice, FloatArray]]]
 
 
@@ -128,11 +129,13 @@ class Beside:
 
 
 def beside(fit: LinearFit, columns: Columns) -> Beside | None:
-    """Find what columns are beside a fit; None where all of them are 0."""
+    """Find what columns are beside a fit; None where there are none, or all of them are 0."""
     sums = [
         (some.T @ some, fit.design[rows].T @ some, some.T @ fit.residual[rows])
         for rows, some in columns()
     ]
+    if not sums:
+        return None
     square, by_basis, pulls = (sum(parts[1:], parts[0]) for parts in zip(*sums, strict=True))
     size = np.sqrt(np.diag(square))
     known = size > 0.0
