@@ -161,9 +161,7 @@ def test_the_path_of_the_joint_from_the_anchor_is_differentiated_by_time(driver:
 
 
 def test_an_anchor_may_go_round_a_circle_by_a_way_in_mm(monkeypatch: pytest.MonkeyPatch) -> None:
-    def moved(
-        qt: sp.Expr, first: sp.Matrix, second: sp.Matrix, sincos: limbs.SinCos
-    ) -> sp.Matrix:
+    def moved(qt: sp.Expr, first: sp.Matrix, second: sp.Matrix, sincos: limbs.SinCos) -> sp.Matrix:
         sine, cosine = sincos(qt / sp.sqrt(first.dot(first)))
         return cosine * first + sine * second
 
