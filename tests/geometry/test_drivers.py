@@ -37,5 +37,5 @@ def test_a_radius_is_stated_where_the_anchor_turns_and_only_there(
 
 
 def test_a_driver_that_the_core_lacks_is_refused_with_the_way_to_it() -> None:
-    with pytest.raises(ValueError, match=r"arc: .*derive/limbs\.py"):
-        Driver("arc")
+    with pytest.raises(ValueError, match=r"winch: .*derive/limbs\.py"):
+        Driver("winch")
