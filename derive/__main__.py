@@ -74,7 +74,14 @@ def _names() -> str:
 
 
 def _functions(functions: list[Function]) -> str:
-    return "\n".join(function.emit() for function in functions)
+    return "\n".join(map(_emitted, functions))
+
+
+def _emitted(function: Function) -> str:
+    try:
+        return function.emit()
+    except NotImplementedError as error:
+        raise NotImplementedError(f"{function.name}: {error}") from None
 
 
 def _header(module: str, body: str, *also: str) -> str:

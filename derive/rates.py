@@ -32,15 +32,13 @@ def _path(f: Function, name: str, what: str) -> sp.Matrix:
     return path
 
 
-def _limb_path(
-    f: Function, driver: Driver, qt: sp.Expr, drive: sp.Expr
-) -> tuple[sp.Matrix, sp.Expr]:
+def _limb_path(f: Function, driver: Driver, drive: sp.Expr) -> tuple[sp.Matrix, sp.Expr]:
     """d(t) and ρ(t), up to a constant, of a limb whose joint and actuator move."""
     h = _path(f, "h", "p + R b - base [mm]")
     first, second = directions(f)
 
     def sincos(angle: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
-        f.sincos("q", qt)  # those at the start are known
+        f.sincos("q", angle.subs(T, 0))  # those at the start are known
         return sp.sin(angle), sp.cos(angle)
 
     rho = drive if driver.stretches else sp.S.Zero  # a rod's length stays
@@ -55,7 +53,7 @@ def _joint_path(driver: Driver) -> Function:
         f"d, ḋ, d̈ of d = p + R b - c,  {driver.formula}",
     )
     qt, qt1, qt2 = _moved_drive(f)
-    path, _ = _limb_path(f, driver, qt, qt + qt1 * T + qt2 * T**2 / 2)
+    path, _ = _limb_path(f, driver, qt + qt1 * T + qt2 * T**2 / 2)
     for k, name in enumerate(("d", "d1", "d2")):
         f.output(name, path.applyfunc(lambda e, k=k: _at_start(f, e, k)), "[mm, /s, /s²]")
     return f
@@ -75,7 +73,7 @@ def _rates(driver: Driver) -> Function:
     )
     qt = f.scalar("qt", "q̃ [mm or rad]")
     speed = sp.Symbol("speed", real=True)
-    path, rho = _limb_path(f, driver, qt, qt + speed * T)
+    path, rho = _limb_path(f, driver, qt + speed * T)
 
     # Φ = (d·d - ρ²)/2, its derivatives by t with dq̃/dt as it turns out and no d²q̃/dt²
     d = f.let("d", path.applyfunc(lambda e: _at_start(f, e)), "from the anchor to the joint")
@@ -100,7 +98,7 @@ def _sphere_bend(driver: Driver) -> Function:
         f"d²Φ/dt²,  Φ = (d·d - ρ²)/2,  {driver.formula}",
     )
     qt, qt1, qt2 = _moved_drive(f)
-    path, rho = _limb_path(f, driver, qt, qt + qt1 * T + qt2 * T**2 / 2)
+    path, rho = _limb_path(f, driver, qt + qt1 * T + qt2 * T**2 / 2)
     d, d1, d2 = (
         f.let(name, path.applyfunc(lambda e, k=k: _at_start(f, e, k)))
         for k, name in enumerate(("d", "velocity", "acceleration"))

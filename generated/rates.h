@@ -1,5 +1,5 @@
 /* Generated from derive/rates.py by `python -m derive`; never edited by hand.
- * derivation 30e5480d1d0afb07
+ * derivation 481631c8fc81851c
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 /*

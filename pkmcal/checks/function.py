@@ -107,7 +107,7 @@ def whole_size(largest: float, within: tuple[float, float]) -> Iterator[Finding]
 def _stroke_units(robot: Robot) -> Iterator[Finding]:
     for i, limb in enumerate(robot.model.limbs):
         low, high = limb.stroke or (0.0, 0.0)
-        if KINDS[limb.kind].driver.turns and max(-low, high) > 2 * _FULL_TURN:
+        if KINDS[limb.kind].actuator_unit == "rad" and max(-low, high) > 2 * _FULL_TURN:
             yield Finding(
                 "angle",
                 (i + 1,),
@@ -124,7 +124,7 @@ def _sizes(robot: Robot) -> dict[str, float]:
     ends = [
         max(map(abs, limb.stroke))
         for limb in robot.model.limbs
-        if limb.stroke is not None and not KINDS[limb.kind].driver.turns
+        if limb.stroke is not None and KINDS[limb.kind].actuator_unit == "mm"
     ]
     sizes = {
         "base joints": float(np.linalg.norm(base.points, axis=1).max()),
@@ -265,8 +265,8 @@ def unreachable(robot: Robot) -> Iterator[Finding]:
 
 
 def _shown(robot: Robot, limb: int) -> tuple[float, str]:
-    crank = KINDS[robot.model.limbs[limb].kind].driver.turns
-    return (180 / np.pi, "deg") if crank else (1.0, "mm")
+    angle = KINDS[robot.model.limbs[limb].kind].actuator_unit == "rad"
+    return (180 / np.pi, "deg") if angle else (1.0, "mm")
 
 
 def _reached(robot: Robot, ends: FloatArray) -> float:

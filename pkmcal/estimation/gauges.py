@@ -103,8 +103,10 @@ def _motions(robot: Robot) -> FloatArray:
             change[i][[SLOTS.index(name) for name in AXES[axis]], columns + 3 : columns + 6] = (
                 tilts[:2]
             )
-            if axis == "base" and KINDS[limb.kind].driver.turns:
-                change[i, _OFFSET, 3:6] = tilts[2]
+            driver = KINDS[limb.kind].driver
+            if axis == "base" and driver.turns:  # a turn of the circle is a change of the zero
+                radius = slots[i, SLOTS.index(driver.lengths[driver.arm])]
+                change[i, _OFFSET, 3:6] = tilts[2] * (radius if driver.unit == "mm" else 1.0)
     if all(KINDS[limb.kind].actuator_unit == "mm" for limb in limbs):
         lengths = [*_SCALED, *range(len(SLOTS), robot.model.own_width)]
         change[:, lengths, _SCALE] = slots[:, lengths]

@@ -8,10 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Literal
 
 from pkmcal.arrays import Unit
 from pkmcal.core.library import DRIVERS as OF_THE_CORE
 from pkmcal.core.pulleys import BENT
+
+Carries = Literal["", "along", "about"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,9 +29,10 @@ class Driver:
         Of the actuator coordinate, and of the offset.
     lengths : mapping of str to str
         Keys of the fixed lengths of the limb, and the slots they are in.
-    carries : bool
-        Whether it moves the joint that a rod hangs on, the anchor, along or about the base axis:
-        the inverse then has two branches. Otherwise it changes the length of the limb.
+    carries : {"", "along", "about"}
+        How it moves the joint that a rod hangs on, the anchor: along the base axis or about it;
+        the inverse then has two branches. With "" it changes the length of the limb. One that
+        moves its anchor about the axis has the radius as its length beside the rod.
     has_zero, needs_zero : bool
         Whether the direction in which an angle about the base axis is 0 can be stated, or must be.
     points : bool
@@ -44,7 +48,7 @@ class Driver:
     name: str
     unit: Unit = "mm"
     lengths: Mapping[str, str] = field(default_factory=dict)
-    carries: bool = False
+    carries: Carries = ""
     has_zero: bool = False
     needs_zero: bool = False
     points: bool = False
@@ -55,7 +59,15 @@ class Driver:
     def __post_init__(self) -> None:
         object.__setattr__(self, "core", self.core or self.name)
         if self.name not in (*OF_THE_CORE, *BENT) or self.core not in OF_THE_CORE:
-            raise ValueError(f"{self.name}: the core has no such driver")
+            raise ValueError(
+                f"{self.name}: the core has no such driver, but {', '.join(OF_THE_CORE)}: "
+                "declare it in derive/limbs.py, make regenerate and build"
+            )
+        if self.turns != any(key != "rod" for key in self.lengths) and not self.swivels:
+            raise ValueError(
+                f"{self.name}: lengths must name a radius beside the rod where, and only where, "
+                'carries is "about"'
+            )
 
     @property
     def bent(self) -> bool:
@@ -65,31 +77,31 @@ class Driver:
     @property
     def has_base_axis(self) -> bool:
         """True if the limb has an axis on its base side because of its driver."""
-        return self.carries or self.swivels
+        return bool(self.carries) or self.swivels
 
     @property
     def slides(self) -> bool:
         """True if the anchor is a carriage, along the base axis."""
-        return self.carries and self.unit == "mm"
+        return self.carries == "along"
 
     @property
     def turns(self) -> bool:
-        """True if the anchor turns about the base axis, by the actuator's angle."""
-        return self.carries and self.unit == "rad"
+        """True if the anchor turns about the base axis, by an angle or by a way on its circle."""
+        return self.carries == "about"
 
     @property
     def arm(self) -> str:
-        """Key of the length at which the anchor turns; "" where it does not."""
+        """Key of the radius at which the anchor turns; "" where it does not."""
         return next((key for key in self.lengths if key != "rod"), "") if self.turns else ""
 
 
 LENGTH = Driver("length", jointed=True)
-SLIDER = Driver("slider", lengths={"rod": "rod"}, carries=True, jointed=True)
+SLIDER = Driver("slider", lengths={"rod": "rod"}, carries="along", jointed=True)
 CRANK = Driver(
     "crank",
     "rad",
     {"rod": "rod", "crank": "crank"},
-    carries=True,
+    carries="about",
     has_zero=True,
     needs_zero=True,
     jointed=True,

@@ -27,8 +27,8 @@ class LimbKind:
         The name of the kind.
     driver : Driver
         How the actuator moves the limb.
-    what : str
-        What the limb is, in a few words.
+    what, many : str
+        What the limb is, in a few words, and what several of them are.
     axes : mapping of str to str
         Key of each axis of the core (`pkmcal.core.AXES`) that the limb has; its tilts have the key
         with ``_tilt`` behind it.
@@ -44,6 +44,7 @@ class LimbKind:
     name: str
     driver: Driver
     what: str
+    many: str
     axes: Mapping[str, str] = field(default_factory=dict)
     rows: tuple[str, ...] = ()
     couple: bool = False
@@ -115,11 +116,12 @@ class LimbKind:
 KINDS: dict[str, LimbKind] = {
     kind.name: kind
     for kind in (
-        LimbKind("UPS", LENGTH, "a leg of variable length"),
+        LimbKind("UPS", LENGTH, "a leg of variable length", "legs of variable length"),
         LimbKind(
             "UPR",
             LENGTH,
             "a leg of variable length that keeps to a plane of the platform",
+            "legs of variable length that keep to a plane of the platform",
             axes={"base": "universal", "platform": "revolute"},
             rows=("platform_plane",),
             couple=True,
@@ -128,27 +130,50 @@ KINDS: dict[str, LimbKind] = {
             "RPS",
             LENGTH,
             "a leg of variable length that keeps to a plane of the base",
+            "legs of variable length that keep to a plane of the base",
             axes={"base": "normal"},
             rows=("base_plane",),
         ),
-        LimbKind("PUS", SLIDER, "a carriage and a rod", axes={"base": "slider"}),
+        LimbKind(
+            "PUS",
+            SLIDER,
+            "a carriage and a rod",
+            "carriages, each with a rod",
+            axes={"base": "slider"},
+        ),
         LimbKind(
             "PRS",
             SLIDER,
             "a carriage and a rod that keeps to a plane of the carriage",
+            "carriages, each with a rod that keeps to a plane of the carriage",
             axes={"base": "slider", "hinge": "normal"},
             rows=("hinge_plane",),
         ),
-        LimbKind("cable", LENGTH, "a cable or belt from point to point, taut", cable=True),
+        LimbKind(
+            "cable",
+            LENGTH,
+            "a cable or belt from point to point, taut",
+            "cables or belts from point to point, taut",
+            cable=True,
+        ),
         LimbKind(
             "pulley",
             PULLEY,
             "a cable over a swivelling pulley, taut",
+            "cables over swivelling pulleys, taut",
             axes={"base": "swivel"},
             cable=True,
         ),
-        LimbKind("tackle", TACKLE, "a cable over several points, taut", cable=True),
-        LimbKind("RUS", CRANK, "a crank and a rod", axes={"base": "axis"}),
+        LimbKind(
+            "tackle",
+            TACKLE,
+            "a cable over several points, taut",
+            "cables over several points, taut",
+            cable=True,
+        ),
+        LimbKind(
+            "RUS", CRANK, "a crank and a rod", "cranks, each with a rod", axes={"base": "axis"}
+        ),
     )
 }
 

@@ -169,7 +169,7 @@ def _transmission(robot: Robot, by_q: FloatArray, slopes: FloatArray) -> FloatAr
     for i, limb in enumerate(robot.model.limbs):
         kind = KINDS[limb.kind]
         arm = slopes[:, i]
-        if kind.driver.arm:
+        if kind.driver.arm and kind.actuator_unit == "rad":
             arm = arm * abs(float(robot.geometry[f"{kind.driver.arm}{i + 1}"]))
         least = np.minimum(least, np.abs(by_q[:, row, limb.actuator]) / arm)
         row += 1 + len(kind.all_rows(limb.couple > 0))

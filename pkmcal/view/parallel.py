@@ -121,7 +121,7 @@ def _limbs(robot: Robot, moves: FloatArray) -> list[dict[str, Any]]:
         made.append(
             {
                 "kind": limb.kind,
-                "driver": driver.name,
+                "carries": driver.carries,
                 "actuator": limb.actuator,
                 "base": robot.slots[i, :3].tolist(),
                 "axis": limb.frame[:, 2].tolist() if driver.turns else None,

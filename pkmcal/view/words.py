@@ -10,18 +10,13 @@ import numpy as np
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray
 from pkmcal.core.library import POSE
-from pkmcal.geometry.limb_kinds import KINDS
+from pkmcal.geometry.limb_kinds import KINDS, LimbKind
 from pkmcal.kinematics.robot import Robot
 from pkmcal.kinematics.stiffness import stiffness
 
 SYMBOLS = {"alpha": "α", "beta": "β", "gamma": "γ"}
 _COUNTS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 _SAG = 1e-6  # mm: less is rounding
-_PLURALS = {
-    "a leg": "legs", "a carriage and a rod": "carriages, each with a rod",
-    "a crank and a rod": "cranks, each with a rod", "a cable or belt": "cables or belts",
-    "a cable over a swivelling pulley": "cables over swivelling pulleys",
-}  # fmt: skip
 
 
 def of_robot(robot: Robot) -> str:
@@ -35,7 +30,7 @@ def of_robot(robot: Robot) -> str:
     """
     chains = robot.model.chains
     if chains is None:
-        kinds = [(_some(KINDS[kind].what, n), kind) for kind, n in _counted(robot)]
+        kinds = [(_some(KINDS[kind], n), kind) for kind, n in _counted(robot)]
     else:
         own = [limb[: len(limb) - chains.tail] for limb in chains.limbs]
         letters = ["".join(_letter(j.kind, j.actuator) for j in limb) for limb in own]
@@ -108,14 +103,8 @@ def _count(n: int) -> str:
     return _COUNTS[n] if n < len(_COUNTS) else str(n)
 
 
-def _some(what: str, n: int) -> str:
-    if n == 1:
-        return what
-    start = next(start for start in sorted(_PLURALS, key=len)[::-1] if what.startswith(start))
-    rest = what[len(start) :]
-    if "each" not in _PLURALS[start]:
-        rest = rest.replace("keeps", "keep")
-    return f"{_count(n)} {_PLURALS[start]}{rest}"
+def _some(kind: LimbKind, n: int) -> str:
+    return kind.what if n == 1 else f"{_count(n)} {kind.many}"
 
 
 def _ways(moved: Sequence[str], what: str) -> str:

@@ -6,6 +6,7 @@ rational points of the circle.
 
 from __future__ import annotations
 
+import dataclasses
 import random
 from collections.abc import Iterable
 from functools import cache
@@ -157,6 +158,27 @@ def test_the_path_of_the_joint_from_the_anchor_is_differentiated_by_time(driver:
     for order, name in enumerate(("d", "d1", "d2")):
         expected = path.applyfunc(lambda e, order=order: sp.diff(e, t, order).subs(t, 0))
         assert_equal(FUNCTIONS[f"{driver}_path"].result(name), expected)
+
+
+def test_an_anchor_may_go_round_a_circle_by_a_way_in_mm(monkeypatch: pytest.MonkeyPatch) -> None:
+    def moved(qt: sp.Expr, first: sp.Matrix, second: sp.Matrix, sincos: limbs.SinCos) -> sp.Matrix:
+        sine, cosine = sincos(qt / sp.sqrt(first.dot(first)))
+        return cosine * first + sine * second
+
+    arc = dataclasses.replace(limbs.CRANK, name="arc", unit="mm", moved=moved)
+    monkeypatch.setattr(rates, "DRIVERS", (arc,))
+    made = {f.name: f for f in rates.functions() if f.name.startswith("arc_")}
+    assert all("sincos" in f.emit() for f in made.values())
+    t, qt1, qt2 = sp.symbols("t qt1 qt2", real=True)
+    first, second, h1, h2 = (symbols(name, 3) for name in ("first", "second", "h1", "h2"))
+    angle = (qt + qt1 * t + qt2 * t**2 / 2) / sp.sqrt(first.dot(first))
+    path = h + h1 * t + h2 * t**2 / 2 - sp.cos(angle) * first - sp.sin(angle) * second
+    exprs = column([*h, *h1, *h2, *first, *second, qt, qt1, qt2])
+    numbers = rational_point(exprs, seed=3)
+    for order, name in enumerate(("d", "d1", "d2")):
+        for found, entry in zip(made["arc_path"].result(name), path, strict=True):
+            expected = sp.diff(entry, t, order).subs(t, 0)
+            assert abs((found - expected).subs(numbers).n(30)) < 1e-20
 
 
 def test_axes_are_the_third_columns_of_the_tilted_frames() -> None:

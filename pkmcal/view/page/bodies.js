@@ -122,7 +122,7 @@ function closedLimb(out, core, limb, i, limit, show, base, top, R, p) {
   const bad = Object.keys(WHAT).some(name => !(limit[name] >= INSIDE)), stuck = !(limit.stroke >= INSIDE)
   base.push(limb.base), top.push(b)
   out.ball(b, 1.5, 'joint')
-  if (limb.driver === 'length') {
+  if (!limb.carries) {
     out.ball(c, 1.7, 'joint')
     if (limb.kind === 'cable') out.rod(c, b, 0.25, stuck ? 'bad' : 'cable')
     else {
@@ -132,8 +132,8 @@ function closedLimb(out, core, limb, i, limit, show, base, top, R, p) {
       out.rod(end, b, 0.75, stuck ? 'bad' : 'rod')
     }
   } else {
-    out.line(limb.track, stuck ? 'bad' : 'track', limb.driver === 'slider' ? 3 : 1, limb.driver === 'crank')
-    if (limb.driver === 'slider') {
+    out.line(limb.track, stuck ? 'bad' : 'track', limb.carries === 'along' ? 3 : 1, limb.carries === 'about')
+    if (limb.carries === 'along') {
       out.rod(limb.track[0], limb.track[1], 0.55, stuck ? 'bad' : 'rail')
       const way = unit(sub(limb.track[1], limb.track[0])), half = 2.4 * out.thick
       out.rod(add(c, way, -half), add(c, way, half), 2, stuck ? 'bad' : 'tube')
