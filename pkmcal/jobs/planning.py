@@ -124,7 +124,7 @@ def planned(job: Planning, sources: Sources) -> Plan:
 
 
 def options(job: Planning, sources: Sources) -> dict[str, Any]:
-    """What plans and the choice of a next pose take alike, beside machine and candidates.
+    """Arguments that plans and the choice of a next pose share, beside machine and candidates.
 
     Raises
     ------
@@ -160,7 +160,7 @@ def candidates(job: Planning, sources: Sources) -> FloatArray:
 
 
 def axis(text: str) -> list[float]:
-    """What ``--direction`` states: x, y or z of the base, or three numbers.
+    """The direction of ``--direction``: x, y or z of the base, or three numbers.
 
     Raises
     ------

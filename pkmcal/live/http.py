@@ -117,7 +117,7 @@ class Server:
 
 
 def _said(error: urllib.error.HTTPError, body: bytes) -> str:
-    """What a server says of its error, in its own words where it has some."""
+    """Text of a server's error, in its own words where it has some."""
     try:
         message = json.loads(body)["error"]["message"]
     except (ValueError, KeyError, TypeError, RecursionError):

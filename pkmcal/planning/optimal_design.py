@@ -132,7 +132,7 @@ class Design:
         return self._exchanged(found[first_largest(-costs, TIED)], ridge)
 
     def reaching(self, error: float) -> IntArray:
-        """As few candidates as predict an error (mm) that all together do."""
+        """Choose as few candidates as predict an error (mm) that all together reach."""
         error *= 1.0 + _ROUNDED
         nothing = np.array([], dtype=np.intp)
         if self.predicted(nothing) <= error:
@@ -153,7 +153,7 @@ class Design:
         return made
 
     def fewest(self) -> int:
-        """How many candidates it takes at least to identify what those that are there do not."""
+        """Least number of further candidates that identify all numbers."""
         nothing = np.array([], dtype=np.intp)
         information = np.linalg.eigvalsh(self._information(nothing))
         lacking = int((information < _NOTHING).sum())
