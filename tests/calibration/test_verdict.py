@@ -358,7 +358,7 @@ def test_numbers_that_do_not_help_are_doubtful(hexapod: pk.Robot, true: pk.Robot
     assert found.verdict.state == "doubtful"
     (cause, *_) = [each for each in found.verdict.said if each.check == "causes"]
     assert cause.finding.gain > 0.5  # which says more than that little was gained
-    others = [check for check in pk.CHECKS if check.name not in ("causes", "sides")]
+    others = [check for check in pk.CHECKS if check.name not in ("causes", "instrument", "sides")]
     (reason, *_) = pk.diagnose(found, others).reasons
     assert reason.startswith("little was gained, the misfit of 40 fitted points")
 
