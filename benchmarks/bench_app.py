@@ -37,7 +37,11 @@ class Asking:
         connection.request(method, path, text, {"x-pkmcal-token": self.served.token})
         answer = connection.getresponse().read()
         connection.close()
-        if path.startswith("/api/run/") and b'"result"' not in answer:
+        if (
+            path.startswith("/api/run/")
+            and b'"result"' not in answer
+            and b'"crashed"' not in answer
+        ):
             raise RuntimeError(f"{path}: {answer.decode()}")  # its time is none of a result
         return answer
 
@@ -96,8 +100,8 @@ def main() -> None:
                     seconds.append(processor_seconds(worker) - used)
                     wall.append(time.perf_counter() - begin)
                 report.text(
-                    f"a row left out of {rows}, 45 numbers: {statistics.median(seconds):.2f} s of"
-                    f" the worker, {statistics.median(wall):.2f} s until the answer of"
+                    f"a row left out of {rows}, 45 numbers: {spread(seconds)} s of"
+                    f" the worker, {spread(wall)} s until the answer of"
                     f" {len(answer) / 1e3:.0f} kB"
                 )
             ask("POST", "/api/run/report")
@@ -123,22 +127,72 @@ def main() -> None:
                 again.append(time.perf_counter() - begin)
                 used.append(processor_seconds(waits) - before)
             report.text(
-                f"Stop: {1e3 * statistics.median(stops):.0f} ms until the answer; the next fit, of"
-                f" 180 rows, {statistics.median(again):.2f} s after it, of which"
-                f" {statistics.median(used):.2f} s of the process that waited"
+                f"Stop: {spread([1e3 * each for each in stops], 0)} ms until the answer; the next"
+                f" fit, of 180 rows, {spread(again)} s after it, of which {spread(used)} s of the"
+                " process that waited"
+            )
+            again, used = [], []
+            for _ in range(ROUNDS):
+                waits = ready(ask)
+                before, begin = processor_seconds(waits), time.perf_counter()
+                ask("POST", "/api/run/crash")
+                ask("POST", "/api/run/fit")
+                again.append(time.perf_counter() - begin)
+                used.append(processor_seconds(waits) - before)
+            report.text(
+                f"a process that dies: the next fit, of 180 rows, {spread(again)} s after it was"
+                f" told to, of which {spread(used)} s of the process that waited"
             )
             if browser.CHROMIUM is not None:
-                report.text(f"first paint: {painted(served):.0f} ms after the address was given")
+                report.text(f"first paint: {painted(served)} ms after the address was given")
+                own, other = clicked(served)
+                report.text(
+                    f"a row of 180 unticked: {own} ms until the page has its new fit and picture,"
+                    f" {other} ms in a second tab, one after the other in one process"
+                )
 
 
-def painted(served: browser.Served) -> float:
-    """Median of the times until the page shows something, ms; by Chromium's own clock."""
+def spread(found: list[float], digits: int = 2) -> str:
+    """Median, least and most."""
+    middle, least, most = statistics.median(found), min(found), max(found)
+    return f"{middle:.{digits}f} ({least:.{digits}f} to {most:.{digits}f})"
+
+
+def painted(served: browser.Served) -> str:
+    """Times until the page shows something, ms; by Chromium's own clock."""
     found = []
     for _ in range(ROUNDS):
         with browser.page_of(served) as page:
             entry = "performance.getEntriesByName('first-contentful-paint')[0].startTime"
             found.append(float(page.evaluate(entry)))
-    return statistics.median(found)
+    return spread(found, 0)
+
+
+def clicked(served: browser.Served) -> tuple[str, str]:
+    """Times from a click until the page and a second tab have another fit, ms."""
+    watch = """() => { const main = document.getElementById('main')
+      new MutationObserver(() => { window.seen = performance.timeOrigin + performance.now() })
+        .observe(main, { attributes: true, attributeFilter: ['data-fits'] }) }"""
+    click = """() => { const now = performance.timeOrigin + performance.now()
+      document.querySelector('tr[id] input').click(); return now }"""
+    fits = "document.getElementById('main').dataset.fits"
+    own, other = [], []
+    with browser.page_of(served) as page:
+        second = page.context.new_page()
+        for each in (page, second):
+            each.goto(served.url)
+            each.locator("body[data-ready]").wait_for(state="attached")
+            each.get_by_role("button", name="4 Result").click()
+            each.locator("tr[id] input").first.wait_for()
+            each.evaluate(watch)
+        for _ in range(ROUNDS):
+            page.wait_for_timeout(2000)
+            counts = [int(each.evaluate(fits)) for each in (page, second)]
+            begin = page.evaluate(click)
+            for each, count, found in zip((page, second), counts, (own, other), strict=True):
+                each.locator(f"main[data-fits='{count + 1}']").wait_for(state="attached")
+                found.append(each.evaluate("window.seen") - begin)
+    return spread(own, 0), spread(other, 0)
 
 
 def ready(ask: Asking) -> int:

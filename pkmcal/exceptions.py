@@ -33,7 +33,7 @@ class FileError(ArgumentError):
 
 
 class MissingFileError(FileNotFoundError, FileError):
-    """There is no such file, or no folder to write it to."""
+    """Error: there is no such file, or no folder to write it to."""
 
     __str__ = Error.__str__  # before that of OSError
 

@@ -50,12 +50,12 @@ class Result(ReadOnly):
         return visible("\n".join(str(part) for part in self._parts()))
 
     def paragraphs(self) -> list[str]:
-        """Return what it says in words, a paragraph each, without breaks; the title is first."""
+        """Return the text as paragraphs without line breaks; the title is first."""
         texts = (part for part in self._parts() if isinstance(part, str))
         return [visible(" ".join(text.split())) for text in texts if text]
 
     def tables(self) -> list[str]:
-        """Return its tables as a terminal shows them."""
+        """Return the tables as a terminal shows them."""
         return [visible(str(part)) for part in self._parts() if isinstance(part, Table)]
 
     def _columns(self) -> Mapping[str, Sequence[Any]]:

@@ -1,4 +1,4 @@
-"""Keeps what somebody else has put into a file that the window writes."""
+"""Keep what somebody else has put into a file that the window writes."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from itertools import chain, count
 from pathlib import Path
 
-from pkmcal.files.seal import has_seals, is_sealed
+from pkmcal.files.seal import is_sealed
 
 
 def free_place(wanted: Path) -> Path:
@@ -20,7 +20,7 @@ def free_place(wanted: Path) -> Path:
 
 
 class Kept:
-    """What was written here; other contents are kept when these files are written again.
+    """Files that the window wrote; other contents are kept when it writes them again.
 
     A file with a seal says by itself whether it was changed. Of others, such as a printer's
     configuration, a process knows what it wrote.
@@ -31,7 +31,7 @@ class Kept:
 
     @contextmanager
     def aside(self, paths: Iterable[Path]) -> Iterator[list[str]]:
-        """Write these files within the block; at its end a sentence of each that was another's.
+        """Write these files within the block; yield sentences on those of somebody else.
 
         Its content is kept in the project's folder, where the window offers it: a machine as
         another machine, a table as measurements.
@@ -51,15 +51,13 @@ class Kept:
                     copy.unlink()
                 else:
                     said.append(
-                        f"{path.as_posix()} was not as it had been written, and was written again:"
-                        f" what was in it is kept as {copy}"
+                        f"{path.as_posix()} had been changed outside of this window and was written"
+                        f" again; the changed file is kept as {copy}"
                     )
             self._own |= {_digest(each) for each in paths if each.is_file()}
 
     def _is_own(self, path: Path) -> bool:
-        if has_seals(path.suffix):
-            return is_sealed(path.read_bytes(), path.suffix)
-        return _digest(path) in self._own
+        return is_sealed(path.read_bytes(), path.suffix) or _digest(path) in self._own
 
 
 def _digest(path: Path) -> str:

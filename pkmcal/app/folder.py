@@ -148,7 +148,7 @@ class Folder:
         return name, None if former is None else former.name
 
     def refuse_links(self, project: Project) -> None:
-        """Refuse symbolic links that lead out of the folder: of what is read, or written.
+        """Refuse symbolic links that lead out of the folder, to read or to write.
 
         Raises
         ------

@@ -46,7 +46,7 @@ class Live:
         self._process: asyncio.subprocess.Process | None = None
 
     def routes(self) -> list[Route]:
-        """What a page asks for."""
+        """Routes of the requests of a page."""
         return [
             Route("/api/live", self.begin, methods=["POST"]),
             Route("/api/live/stop", self.stopped, methods=["POST"]),

@@ -38,7 +38,7 @@ _RULES = {"feed": "--feed", "dwell": "--dwell", "repeats": "--repeats",
 
 
 class Measurer:
-    """One measurement, and whom it tells and asks.
+    """One measurement, and the page that it tells and asks.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ class Measurer:
             if self._driven is not None:
                 self._driven.stop()
         except DeviceError as error:
-            self._say(f"the machine did not take the stop, stop it by hand: {error}")
+            self._say(f"the machine did not obey the stop: stop it by hand ({error})")
 
     def _ask(self, question: str) -> str:
         self._require_running()
@@ -159,7 +159,7 @@ class Measurer:
         self._send({"said": str(text)})
 
     def _send(self, message: Table) -> None:
-        """Tell the page; where it has gone, stop is on its way."""
+        """Send a message to the page; if the page is gone, the stop is on its way."""
         with self._speaking, suppress(OSError, ValueError):
             self._answers.write(json.dumps(message, allow_nan=False) + "\n")
             self._answers.flush()
@@ -180,7 +180,7 @@ def _log(given: Table) -> str:
 
 
 def _course(course: Course, first: Course | None) -> Table:
-    """What a page shows of a course: the newest rows, what they tell, the next pose."""
+    """Figures of a course for a page: the newest rows, their messages, the next pose."""
     found: Table = {"line": course_words.line(course), "warnings": course_words.warnings(course)}
     predicted = course.predicted
     found["predicted"] = predicted if 0.0 < predicted < float("inf") else None

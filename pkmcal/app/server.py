@@ -35,7 +35,7 @@ from pkmcal.view import scripts
 OPERATIONS = ("take", "machine", "plan", "look", "devices", "fit", "out", "report")
 FOR_TESTS = ("wait", "crash")
 PAGES = ("app.js", "frame.js", "transport.js", "picture.js", "machine.js", "plan.js",
-         "measure.js", "live.js", "result.js", "numbers.js", "out.js")  # fmt: skip
+         "measure.js", "live.js", "result.js", "grid.js", "numbers.js", "out.js")  # fmt: skip
 _KINDS = {".css": "text/css", ".js": "text/javascript", ".html": "text/html"}
 _MOST_STATE = 1_000_000  # bytes
 _SILENT = 15.0  # s, after which a stream of events says that it is there

@@ -160,7 +160,7 @@ class Identification(Solution[Machine], Result):
 
     @cached_property
     def pictures(self) -> tuple[CalibratedPicture, ...]:
-        """What each picture of a board shows beside the calibration; empty without a camera."""
+        """Pictures of boards beside the calibration; empty without a camera."""
         return tuple(pictures(self))
 
     def _by_itself(self) -> FloatArray:

@@ -109,7 +109,7 @@ def quality(found: Solution) -> str:
 
 
 def pictures(listed: Sequence[CalibratedPicture]) -> str:
-    """How far pictures show their board from where the machine is, rms, and the worst of them."""
+    """Distances of pictured boards from where the machine is, rms, and the worst picture."""
     facts = []
     for use in ("fitted", "held out"):
         own = [each for each in listed if each.use == use and np.isfinite(each.seen.across)]
@@ -129,7 +129,7 @@ def pictures(listed: Sequence[CalibratedPicture]) -> str:
 
 
 def by_itself(deviation: FloatArray) -> str:
-    """How well the machine is known at the measured poses, wherever its frames lie."""
+    """Standard deviation of the machine at the measured poses, wherever its frames lie."""
     sure = deviation[np.isfinite(deviation)]
     if not len(sure):
         return filled("", "how the machine moves is not determined at the measured poses")
@@ -214,7 +214,7 @@ def limits(
         if frames and identifiability.unidentifiable:
             yield filled(
                 "  ",
-                "--datum auto (fix='datum') holds as many numbers as only say where frames lie;"
+                "--datum auto (fix='datum') holds the numbers that only say where frames lie;"
                 " the others then have finite ±",
             )
     if correlations:

@@ -93,8 +93,8 @@ def unusual_size(robot: Robot) -> str:
 
 
 def whole_size(largest: float, within: tuple[float, float]) -> Iterator[Finding]:
-    """A machine whose largest length, mm, is that of none."""
-    if not within[0] <= largest <= within[1]:
+    """A machine whose largest length, mm, is that of none; an arm whose axes meet has no length."""
+    if largest and not within[0] <= largest <= within[1]:
         likely = "metres" if largest < within[0] else "micrometres"
         yield Finding(
             "unit",

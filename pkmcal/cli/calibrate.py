@@ -89,9 +89,9 @@ def calibrate(
         typer.Option(
             rich_help_panel=FREE,
             metavar="WORD",
-            help="auto: hold as many numbers as only say where the frames of base and platform"
-            " lie, if they are not known, and those between an arm's joints; the others then have"
-            " finite ±. none: hold none.",
+            help="auto: hold the numbers that only say where frames lie that nobody measured: of"
+            " base and platform, and between the joints of an arm. All others then have a finite"
+            " ±. none: hold none.",
         ),
     ] = "none",
     frame: Annotated[

@@ -73,7 +73,7 @@ def compensate(
     seed: Seed = 0,
     bounds: Annotated[
         float | None,
-        typer.Option(metavar="NUMBER", help="Of the swarm's corrections, mm or rad."),
+        typer.Option(metavar="NUMBER", help="Largest correction of the swarm, mm or rad."),
     ] = None,
     out: Annotated[
         Path | None,
@@ -82,7 +82,7 @@ def compensate(
     chord: Annotated[
         float | None,
         typer.Option(
-            metavar="MM", help="Of a program: how far from straight lines, 0.01 by default."
+            metavar="MM", help="Of a program: largest distance from its lines, 0.01 by default."
         ),
     ] = None,
     joints: Annotated[

@@ -42,7 +42,7 @@ def words(stop: KeyboardInterrupt) -> str:
 
 
 def ends_at_once() -> None:
-    """There is nothing to tidy up, and an exception might end in somebody's import."""
+    """End at once when interrupted: nothing is to be tidied up, and an import might be hit."""
     _handle(_end)
 
 

@@ -56,7 +56,9 @@ def measure(
     kind: Annotated[
         str,
         typer.Option(
-            rich_help_panel=DEVICES, metavar="KIND", help="What it reads, as of pkmcal plan."
+            rich_help_panel=DEVICES,
+            metavar="KIND",
+            help="What the instrument reads, as for pkmcal plan.",
         ),
     ] = "position",
     noise: Annotated[
@@ -64,12 +66,14 @@ def measure(
         typer.Option(
             rich_help_panel=DEVICES,
             metavar="MM",
-            help="Of a reading, one standard deviation; unknown: the readings tell it.",
+            help="Noise of a reading, one standard deviation; unknown: estimate it.",
         ),
     ] = "0.02",
     actuator_noise: Annotated[
         float | None,
-        typer.Option(rich_help_panel=DEVICES, metavar="X", help="Of the actuators, mm or rad."),
+        typer.Option(
+            rich_help_panel=DEVICES, metavar="X", help="Noise of the actuators, mm or rad."
+        ),
     ] = None,
     target: Annotated[
         str | None,
@@ -78,19 +82,22 @@ def measure(
         ),
     ] = None,
     feed: Annotated[
-        float, typer.Option(rich_help_panel=DEVICES, metavar="MM/MIN", help="Of all moves.")
+        float,
+        typer.Option(rich_help_panel=DEVICES, metavar="MM/MIN", help="Feed rate of all moves."),
     ] = 1500.0,
     safe_height: Annotated[
         float | None,
         typer.Option(
             rich_help_panel=DEVICES,
             metavar="Z",
-            help="Rise to it between poses, mm; without it moves are straight.",
+            help="Height to rise to between poses, mm; without it moves are straight.",
         ),
     ] = None,
     dwell: Annotated[
         float,
-        typer.Option(rich_help_panel=DEVICES, metavar="S", help="At rest before each reading."),
+        typer.Option(
+            rich_help_panel=DEVICES, metavar="S", help="Time at rest before each reading."
+        ),
     ] = 0.5,
     repeats: Annotated[
         int, typer.Option(rich_help_panel=DEVICES, metavar="N", help="Readings at each pose.")
@@ -98,7 +105,9 @@ def measure(
     accuracy: Annotated[
         float | None,
         typer.Option(
-            rich_help_panel=CHOICE, metavar="MM", help="Stop where this error is predicted."
+            rich_help_panel=CHOICE,
+            metavar="MM",
+            help="Stop when the predicted error is below this.",
         ),
     ] = None,
     count: Annotated[
@@ -120,7 +129,9 @@ def measure(
     direction: Annotated[
         str | None,
         typer.Option(
-            rich_help_panel=CHOICE, metavar="X,Y,Z", help="In which direction: z of a printer."
+            rich_help_panel=CHOICE,
+            metavar="X,Y,Z",
+            help="Direction in which the error counts: z for a printer.",
         ),
     ] = None,
     within: Annotated[
@@ -226,7 +237,7 @@ def _told_of_lost_connections() -> Iterator[None]:
 
 
 def _started() -> bool:
-    """Whether a person starts it."""
+    """Ask a person to start the machine."""
     try:
         return input(f"type {START} to move it: ").strip() == START
     except EOFError:

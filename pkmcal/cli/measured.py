@@ -83,9 +83,10 @@ FromPnp = Annotated[
         "--from-pnp",
         rich_help_panel=READING,
         metavar="f=PX,board=WxH",
-        help="Poses are those of a board in axes of a camera, as other software found them in"
-        " pictures (PnP): focal length in px and size of the board in mm say which way each is"
-        " sure. noise=PX as well, or it is estimated. --camera-on says what the camera is on.",
+        help="The file has poses of a board in axes of a camera, as other software found them in"
+        " pictures (PnP). The focal length in px and the size of the board in mm tell how accurate"
+        " a pose is in each direction. noise=PX is the noise of a corner; without it it is"
+        " estimated. --camera-on says what the camera is fixed to.",
     ),
 ]
 ProbeOffset = Annotated[

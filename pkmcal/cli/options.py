@@ -84,7 +84,7 @@ Radians = Annotated[bool, typer.Option("--rad", help="Angles on the line are in 
 Seed = Annotated[
     int,
     typer.Option(
-        metavar="N", min=0, max=2**64 - 1, help="Of the random numbers: one seed, one result."
+        metavar="N", min=0, max=2**64 - 1, help="Seed of the random numbers: one seed, one result."
     ),
 ]
 Force = Annotated[

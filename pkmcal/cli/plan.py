@@ -29,7 +29,9 @@ def plan(
     ] = None,
     accuracy: Annotated[
         float | None,
-        typer.Option(metavar="MM", help="Instead: as few as reach this predicted error."),
+        typer.Option(
+            metavar="MM", help="Instead of --count: as few poses as reach this predicted error."
+        ),
     ] = None,
     poses: Annotated[
         Path | None,
@@ -47,16 +49,16 @@ def plan(
         str | None,
         typer.Option(
             metavar="X,Y,Z",
-            help="In which direction of the base the error counts: z, of a printer's nozzle over"
-            " its bed. By default in all, of --kind probe in z.",
+            help="Direction of the base in which the error counts: z for the height of a"
+            " printer's nozzle over its bed. By default all directions; with --kind probe z.",
         ),
     ] = None,
     measured: Annotated[
         Path | None,
         typer.Option(
             metavar="CSV",
-            help="Rows that are there: the plan is for poses beside them. Without a column sigma"
-            " they have --noise.",
+            help="Rows that were measured already: the plan adds poses to them. If they have no"
+            " column sigma, their noise is that of --noise.",
         ),
     ] = None,
     criterion: Annotated[
@@ -67,8 +69,8 @@ def plan(
         typer.Option(
             metavar="KIND",
             help="What is measured: position, pose, height, distance, orientation, closure, pixel"
-            " (pictures of a board) or probe (a printer's own, on its bed). Of several how many"
-            " poses of each: position=20,distance=10.",
+            " (pictures of a board) or probe (a printer's own, on its bed). For several kinds state"
+            " how many poses each has: position=20,distance=10.",
         ),
     ] = "position",
     target: Annotated[
@@ -83,28 +85,28 @@ def plan(
         str,
         typer.Option(
             metavar="MM",
-            help="Of the instrument, one standard deviation; of several kinds also"
+            help="Noise of the instrument, one standard deviation; with several kinds of reading"
             " position=0.02,distance=0.005.",
         ),
     ] = "0.02",
     actuator_noise: Annotated[
         float | None,
-        typer.Option(metavar="X", help="Of the actuators, mm or rad; closure needs it."),
+        typer.Option(metavar="X", help="Noise of the actuators, mm or rad; closure needs it."),
     ] = None,
     travel_weight: Annotated[
         float,
         typer.Option(
             metavar="W",
-            help="What a shorter tour is worth: of 0.5, one 10 % shorter is worth a predicted error"
-            " 5 % larger. 0: nothing.",
+            help="Weight of a short tour: with 0.5 a tour that is 10 % shorter makes up for a"
+            " predicted error that is 5 % larger; with 0 its length does not count.",
         ),
     ] = 0.0,
     payloads: Annotated[
         str | None,
         typer.Option(
             metavar="MASS,MASS",
-            help="What a machine that yields carries in turn, such as 0,100kg; of its file by"
-            " default.",
+            help="Payloads that a machine that yields carries in turn, such as 0,100kg; by default"
+            " the one of its file.",
         ),
     ] = None,
     effects: Annotated[
@@ -141,18 +143,20 @@ def plan(
         str | None,
         typer.Option(
             metavar="FIRMWARE",
-            help="Beside these a program that drives from pose to pose: of klipper, reprap, marlin"
-            " or linuxcnc. All ways were looked at; nothing knows what stands in them.",
+            help="Also write a program in G-code that drives from pose to pose, for klipper,"
+            " reprap, marlin or linuxcnc. Its ways stay within the limits of the machine; obstacles"
+            " are not known.",
         ),
     ] = None,
     dwell: Annotated[
-        float, typer.Option(metavar="S", help="How long that waits at each pose.")
+        float, typer.Option(metavar="S", help="How long the program waits at each pose.")
     ] = 5.0,
     safe_height: Annotated[
         float | None,
         typer.Option(
             metavar="Z",
-            help="To what height it rises between poses, mm; of a probe 5, else straight.",
+            help="Height to which the program rises between poses, mm; by default it moves"
+            " straight, with --kind probe it rises to 5 mm.",
         ),
     ] = None,
     out: Annotated[

@@ -257,7 +257,7 @@ class Program:
         return meaning or Meaning.MOVES
 
     def _home(self, state: _State) -> None:
-        """Where homing ends is in the controller's configuration, but for angles of home."""
+        """Forget the pose: but for angles, only the controller's configuration says where it is."""
         state.at, state.fresh, state.lost_by = self._start, True, _HOMING
         state.known = set(self._homed)
 

@@ -7,10 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from pkmcal.controllers import linear_delta, rotary_delta
-from pkmcal.controllers.linear_delta import Bed, FirmwareDelta
+from pkmcal.controllers import klipper_bed, linear_delta, rotary_delta
+from pkmcal.controllers.linear_delta import FirmwareDelta
 from pkmcal.controllers.printer_config import (
     ANGLES,
+    CALIBRATE,
     STEPPERS,
     PrinterConfig,
     kinematics,
@@ -28,22 +29,22 @@ from pkmcal.readings.distances import Between
 _LINEAR_HEAD = """\
 # Imported from {file} by pkmcal: the firmware's numbers of a linear delta.
 # An actuator coordinate is the motor's steps down from its end stop; `offset` is the height of the
-# carriage there, position_endstop + sqrt(arm_length^2 - delta_radius^2).
+# carriage there, position_endstop + sqrt(arm_length^2 - delta_radius^2). Above `[workspace]` the
+# firmware allows less than its radius.
 """
 _ROTARY_HEAD = """\
 # Imported from {file} by pkmcal: the firmware's numbers of a rotary delta.
 # An actuator coordinate is the motor's steps down from its end stop; `offset` is the angle of the
 # crank there, below the horizontal. Radius and height are those of the shoulders less the
-# effector's.
+# effector's. Above `[workspace]` the firmware allows less than its radius.
 """
 # Sections with the offsets of a bed probe; of an eddy current probe its own name follows.
 _PROBES = ("probe", "bltouch", "smart_effector", "load_cell_probe", "dockable_probe")
 _NAMED_PROBE = "probe_eddy_current "
-_CALIBRATE = "delta_calibrate"
 
 
 def of_klipper(path: str | PathLike[str]) -> Stored:
-    """The robot file of a printer.cfg, and what DELTA_CALIBRATE and DELTA_ANALYZE stored.
+    """The robot file of a printer.cfg, and what DELTACALIBRATE and DELTA_ANALYZE stored.
 
     Raises
     ------
@@ -61,14 +62,15 @@ def of_klipper(path: str | PathLike[str]) -> Stored:
         crank = _rotary(printer)
         home = round(0.5 * max(crank.endstops), 3)
         about = About(where.stem, _ROTARY_HEAD.format(file=where.name), probe, controller)
-        text = rotary_delta.text_of(crank, home, about, _bed(printer))
+        text = rotary_delta.text_of(crank, home, about, klipper_bed.of_rotary(printer, crank))
     else:
         delta, steps = _linear(printer)
         about = About(where.stem, _LINEAR_HEAD.format(file=where.name), probe, controller)
         rods = heights is not None and distances is not None
-        text = linear_delta.text_of(delta, steps, about, bed=_bed(printer), rods=rods)
+        bed = klipper_bed.of_linear(printer, delta)
+        text = linear_delta.text_of(delta, steps, about, bed=bed, rods=rods)
     if heights is None:
-        unread = (*unread, "DELTA_CALIBRATE, then SAVE_CONFIG, store heights in it")
+        unread = (*unread, "DELTACALIBRATE, then SAVE_CONFIG, store heights in it")
     return Stored(text, heights, distances, (*notes, *unread))
 
 
@@ -86,15 +88,6 @@ def _linear(printer: PrinterConfig) -> tuple[FirmwareDelta, list[float]]:
         carriages.append(_first(printer, section, "position_endstop") + height)
         steps.append(-step_of(printer, section))
     return FirmwareDelta(radius, tuple(angles), tuple(arms), tuple(carriages)), steps
-
-
-def _bed(printer: PrinterConfig) -> Bed:
-    """Return the bed: within the print radius, or else where DELTA_CALIBRATE probes."""
-    radius = None
-    for section, option in (("printer", "print_radius"), (_CALIBRATE, "radius")):
-        if radius is None and printer.has(section, option):
-            radius = positive(printer, section, option)
-    return Bed(radius, printer.number("printer", "minimum_z_position", 0.0))
 
 
 def _rotary(printer: PrinterConfig) -> RotaryDelta:
@@ -158,7 +151,7 @@ def _probe(
 
 def _count(printer: PrinterConfig, name: str) -> int:
     count = 0
-    while printer.has(_CALIBRATE, f"{name}{count}"):
+    while printer.has(CALIBRATE, f"{name}{count}"):
         count += 1
     return count
 
@@ -170,8 +163,8 @@ def _heights(printer: PrinterConfig) -> Measurements | None:
     ]
     if not names:
         return None
-    steps = [printer.numbers(_CALIBRATE, f"{name}_pos", 3) for name in names]
-    values = [printer.number(_CALIBRATE, name) for name in names]
+    steps = [printer.numbers(CALIBRATE, f"{name}_pos", 3) for name in names]
+    values = [printer.number(CALIBRATE, name) for name in names]
     return Measurements(steps, values, "height")
 
 
@@ -181,7 +174,7 @@ def _distances(printer: PrinterConfig) -> Measurements | None:
     if not names:
         return None
     first, then = (
-        [printer.numbers(_CALIBRATE, f"{name}_pos{end}", 3) for name in names] for end in (1, 2)
+        [printer.numbers(CALIBRATE, f"{name}_pos{end}", 3) for name in names] for end in (1, 2)
     )
-    values = [printer.number(_CALIBRATE, name) for name in names]
+    values = [printer.number(CALIBRATE, name) for name in names]
     return Measurements(first, values, Between(then))

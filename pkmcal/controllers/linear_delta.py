@@ -65,21 +65,32 @@ class Bed:
     ----------
     radius : float or None
         How far from the middle, mm; None where the firmware's file does not state it.
-    lowest : float
-        The least height, mm.
+    lowest, highest : float
+        The least height, and the largest at which a firmware still lets it go as far from the
+        middle; mm.
     """
 
     radius: float | None = None
     lowest: float = 0.0
+    highest: float = np.inf
 
 
 def _box(firmware: FirmwareDelta, bed: Bed) -> dict[str, list[float]]:
-    """The workspace: between the towers, over the bed and below the end stops."""
-    across, high = round(firmware.radius, 3), round(min(firmware.endstops), 3)
+    """The workspace: between the towers, over the bed and below the end stops.
+
+    Without the radius of a bed, a square in the circle of the towers: no firmware goes beyond that.
+    """
+    across, high = firmware.radius, _down(min(*firmware.endstops, bed.highest))
     if across <= 0.0 or high <= max(0.0, bed.lowest):
         return {}
+    across = _down(across if bed.radius is not None else across / np.sqrt(2.0))
     box = {"x": [-across, across], "y": [-across, across], "z": [bed.lowest, high]}
     return box if bed.radius is None else box | {"radius": [0.0, bed.radius]}
+
+
+def _down(value: float) -> float:
+    """Round to what is not above."""
+    return float(np.floor(1e3 * value + 1e-6) / 1e3)
 
 
 def of_robot(robot: Robot, project: bool) -> tuple[FirmwareDelta, Loss]:
@@ -217,9 +228,10 @@ def text_of(
             zip(firmware.arms, firmware.carriages, gains, strict=True), 1
         )
     ]
+    home = min(round(0.5 * max(firmware.endstops), 3), box["z"][1] if box else np.inf)
     return robot_files.text_of(
         about,
-        {"map": "translation", "home": {"z": round(0.5 * max(firmware.endstops), 3)}},
+        {"map": "translation", "home": {"z": home}},
         [*_FREE, *_RODS] if rods else _FREE,
         limbs,
         parameters,

@@ -21,6 +21,7 @@ from pkmcal.exceptions import FileError
 from pkmcal.files.text_lines import MARK, lines_of, text_in
 
 STEPPERS = ("stepper_a", "stepper_b", "stepper_c")
+CALIBRATE = "delta_calibrate"
 ANGLES = {  # by kinematics, where the file says nothing
     "delta": dict(zip(STEPPERS, (210.0, 330.0, 90.0), strict=True)),
     "rotary_delta": dict(zip(STEPPERS, (30.0, 150.0, 270.0), strict=True)),

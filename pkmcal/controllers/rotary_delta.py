@@ -58,6 +58,11 @@ class RotaryDelta:
     gains: tuple[float, ...]
 
     @property
+    def across(self) -> float:
+        """How far from the middle arms and rods reach level with the shoulders, mm."""
+        return min(self.radius + min(self.cranks), min(self.rods) - self.radius)
+
+    @property
     def endstops(self) -> tuple[float, ...]:
         """Height of the pose in the middle with each crank at its end stop, q = 0; mm."""
         found = []
@@ -185,12 +190,12 @@ def text_of(delta: RotaryDelta, home: float, about: About, bed: Bed | None = Non
     parameters |= {f"angle{i}": angle for i, angle in enumerate(delta.angles, 1)}
     heights = ["height"] if alike else ["base*.z"]
     free = [*heights, "offset1", "offset2", "offset3"]
-    pose = {"map": "translation", "home": {"z": home}}
+    box = None if bed is None else _box(delta, bed)
+    pose = {"map": "translation", "home": {"z": min(home, box["z"][1]) if box else home}}
     remark = (
         "# The radius stays: heights hardly tell it from the others. So do the angles: the axes\n"
         "# of the cranks would not turn with them.\n"
     )
-    box = None if bed is None else _box(delta, bed)
     limbs = []
     for i in range(_TOWERS):
         angle = np.radians(delta.angles[i])
@@ -211,8 +216,7 @@ def text_of(delta: RotaryDelta, home: float, about: About, bed: Bed | None = Non
 
 def _box(delta: RotaryDelta, bed: Bed) -> dict[str, list[float]] | None:
     """The workspace: where arms and rods reach level with the shoulders, below the end stops."""
-    out = min(delta.radius + min(delta.cranks), min(delta.rods) - delta.radius)
-    across, high = round(out, 3), round(min(delta.endstops), 3)
+    across, high = round(delta.across, 3), round(min(*delta.endstops, bed.highest), 3)
     if across <= 0.0 or high <= max(0.0, bed.lowest):
         return None
     radius = across if bed.radius is None else bed.radius

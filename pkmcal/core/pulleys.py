@@ -351,7 +351,7 @@ class PulleyMachine(Machine):
     def _met(
         self, slots: FloatArray, pose: FloatArray, q: FloatArray, q1: FloatArray, q2: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """As that of `Machine`; each of these cables with an actuator of its own."""
+        """Accelerations as of `Machine`; each of these cables needs an actuator of its own."""
         mine = self._of_actuator[self._over]
         if (np.bincount(self._of_actuator)[mine] > 1).any():
             raise ArgumentError(

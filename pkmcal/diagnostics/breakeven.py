@@ -84,7 +84,7 @@ def breakeven(fit: Fit) -> tuple[Breakeven, ...]:
 
 
 def _kinds(names: list[str], chosen: Parameters) -> tuple[str, ...]:
-    """Names as wildcards, but of a kind of which some are stated: these do not count."""
+    """Wildcards for names; the names themselves of a kind of which some are stated."""
     geometry, asked = chosen.robot.geometry, chosen.asked.uncertainty
     stated = {*uncertain_names(asked, chosen.robot, ()), *_considered(chosen)}
     found = dict[str, None]()
@@ -104,8 +104,9 @@ def in_words(found: tuple[Breakeven, ...]) -> str:
     if not found:
         return ""
     return (
-        f"± double on the whole if {', or '.join(map(str, found))}: numbers that are not free count"
-        " as exact; state --uncertainty (uncertainty=) if they may be wrong by as much"
+        f"numbers that are not free count as exact; ± double on the whole if"
+        f" {', or '.join(map(str, found))}: state --uncertainty (uncertainty=) if such errors are"
+        " possible"
     )
 
 

@@ -249,7 +249,7 @@ def _of_instruments(fit: Fit) -> Iterator[Cause]:
 
 
 def _held(held: HeldNumbers) -> Callable[[Fit], Columns | None]:
-    """Columns of numbers of instruments, of all alike, in sets that do not look for them."""
+    """Columns of instruments' numbers, all moved alike, in sets that do not look for them."""
 
     def columns(fit: Fit) -> Columns | None:
         known = [

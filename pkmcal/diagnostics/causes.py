@@ -55,7 +55,7 @@ def found_causes(found: Solution) -> tuple[FoundCause, ...]:
 
 
 def _of_instruments(found: Solution) -> tuple[FoundCause, ...]:
-    """Numbers of an instrument that would explain what a fit leaves that is no fit."""
+    """Numbers of an instrument that would explain the residuals of a bad fit."""
     sure = _explained(found, of_instruments_alone)
     return tuple(each for each in sure[:1] if each.chance < _CERTAIN)
 
@@ -88,7 +88,7 @@ def _level(found: Solution, cause: FoundCause) -> Level:
 
 def _text(found: Solution, cause: FoundCause) -> str:
     also = f" (or as well {', '.join(cause.also)})" if cause.also else ""
-    harm = f", and the numbers move by {cause.shift:.2g} of their ±" if cause.shift > 0.5 else ""
+    harm = f", and the numbers move by {cause.shift:.2g} times their ±" if cause.shift > 0.5 else ""
     return (
         f"residuals look like {cause.name}{also}: with it they fall by {100 * cause.gain:.0f} %"
         f" ({chance_text(cause.chance)}){harm}; {cause.cure}"

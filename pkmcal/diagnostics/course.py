@@ -45,7 +45,7 @@ CHECKS = (
         say=lambda found, seen: str(seen),
     ),
     Check(
-        name="two-machines", about="sets, sessions, halves or other rows want other numbers",
+        name="two-machines", about="sets, sessions, halves or other rows fit better apart",
         unless=("grave", "copies", "displaced-target", "follows-loads"), levels=("doubt", "remark"),
         run=lambda found: at_most_one(apart(found)),
         level_of=lambda found, seen: _level(found, seen) if seen.found else None,

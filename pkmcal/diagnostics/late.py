@@ -73,7 +73,7 @@ class Late:
 
 
 def late(found: Solution) -> Late | None:
-    """Test it; None where chance explains as much, or residuals are rounding."""
+    """Test for late readings; None where chance explains as much, or residuals are rounding."""
     sure = found.fit.uncertainty
     if sure.rounded or not sure.equations.whitening.any_read:
         return None

@@ -28,7 +28,7 @@ _OF_LEGS, _OF_JOINTS = Elasticity("offset*"), Elasticity("joint*")
 
 
 class FollowedLoads(NamedTuple):
-    """Loads of rows that the residuals of a machine follow of which nothing yields.
+    """Loads of the rows that the residuals follow, of a machine of which nothing yields.
 
     Attributes
     ----------

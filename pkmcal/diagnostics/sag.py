@@ -135,16 +135,18 @@ def _figures(gained: Comparison) -> str:
 def _say_lacking(found: Solution, lacking: LackingSag) -> str:
     gained, wave = lacking.comparison, lacking.wave
     joints = sorted({name.partition(".")[0].removeprefix("sag") for name in gained.numbers})
-    harm = f", and the numbers move by {gained.shift:.2g} of their ±" if gained.shift > 0.5 else ""
+    harm = (
+        f", and the numbers move by {gained.shift:.2g} times their ±" if gained.shift > 0.5 else ""
+    )
     also = (
-        f", or as well a wave a turn of joint {wave.joints}, as of an eccentric encoder or a tilted"
-        f" axis, with {Remedy('effects', (wave,))}"
+        f"; a wave a turn of joint {wave.joints}, as of an eccentric encoder or a tilted axis,"
+        f" explains as much: {Remedy('effects', (wave,))}"
         if wave is not None
         else ""
     )
     return (
-        f"residuals follow the torque of gravity on joints {', '.join(joints)}: {_figures(gained)}"
-        f" with {Remedy('effects', (lacking.effect,))}{also}{harm}"
+        f"residuals follow the torque of gravity on joints {', '.join(joints)}: with"
+        f" {Remedy('effects', (lacking.effect,))} {_figures(gained)}{harm}{also}"
     )
 
 
@@ -153,7 +155,10 @@ def _say_in_it(found: Solution, gained: Comparison) -> str:
     if not gained.passes:
         return f"sag does not help beyond chance: {figures}; --effects none leaves it out"
     better = min(gained.before, gained.alone)
-    return f"the arm sags: {figures}; a controller that holds no sag is left with {better:.3f} mm"
+    return (
+        f"the arm sags: with its sag {figures}; a controller that holds no sag is left with"
+        f" {better:.3f} mm"
+    )
 
 
 CHECKS = (

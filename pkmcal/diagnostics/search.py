@@ -127,7 +127,8 @@ CHECKS = (
     Check(
         name="weak-combinations",
         about="combinations of numbers are so weak that the search kept what they had",
-        at_once=True, run=lambda found: at_most_one(_kept(found) or None), say=_kept_text,
+        unless=("other-modes",), at_once=True,
+        run=lambda found: at_most_one(_kept(found) or None), say=_kept_text,
         remedies=lambda found, _: (Remedy("prior"),),
     ),
     Check(
@@ -157,11 +158,11 @@ CHECKS = (
     ),
     Check(
         name="uninformative-poses",
-        about="what was read at some poses determines these poses at most", levels=("remark",),
+        about="readings at some poses determine at most the poses themselves", levels=("remark",),
         run=lambda found: at_most_one(found.idle or None),
         say=lambda found, count: (
-            f"{count} {'poses say' if count > 1 else 'pose says'} nothing: what was read there"
-            " determines the pose at most"
+            f"{count} {'poses add' if count > 1 else 'pose adds'} nothing: the readings there"
+            " determine at most the pose itself"
         ),
     ),
 )  # fmt: skip

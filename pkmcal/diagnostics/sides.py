@@ -1,4 +1,4 @@
-"""Whether one side of the workspace wants other numbers than the other.
+"""Test whether the two sides of the workspace fit better apart.
 
 A joint with play hangs to the side to which the platform leans, a rail is bowed, a probe tilts its
 nozzle: no column of a cause has the shape of each. That one model does not hold on both sides of
@@ -14,7 +14,7 @@ import numpy as np
 
 from pkmcal.arrays import BoolArray
 from pkmcal.diagnostics.check import Check, Level, at_most_one
-from pkmcal.diagnostics.two_machines import equations_of_visits, tested
+from pkmcal.diagnostics.two_machines import equations_of_visits, fit_of, tested
 from pkmcal.diagnostics.visits import visits_of
 from pkmcal.display import chance_text
 from pkmcal.fitted.solution import Solution
@@ -52,10 +52,11 @@ class Sides:
 
     def __str__(self) -> str:
         return (
-            f"poses {self.where} want other numbers, {self.ratio:.2g} times as far apart as noise"
-            f" lets expect ({chance_text(self.chance)}; with them {self.residual:.2g} times the"
-            " residuals): the model misses something that changes sides, such as play of a joint"
-            " that hangs where the load pushes it, or a bowed rail"
+            f"poses {self.where} and the others fit better apart: their numbers then differ"
+            f" {self.ratio:.2g} times as much as noise lets expect, and the residuals are"
+            f" {self.residual:.2g} times as large ({chance_text(self.chance)}). The model misses"
+            " something that changes sides, such as play of a joint that hangs where the load"
+            " pushes it, or a bowed rail"
         )
 
 
@@ -68,7 +69,7 @@ def sides(found: Solution) -> Sides | None:
         return None
     groups = dict(_groups(found))
     use, key = equations_of_visits(found, visits_of(found))
-    known = tested(found, groups, use, key) if groups else {}
+    known = tested(found, fit_of(found), groups, use, key) if groups else {}
     if not known:
         return None
     where = min(known, key=lambda each: known[each].chance)
@@ -95,7 +96,7 @@ def _level(found: Solution, seen: Sides) -> Level | None:
 
 CHECKS = (
     Check(
-        name="sides", about="the two sides of the workspace want other numbers",
+        name="sides", about="the two sides of the workspace fit better apart",
         unless=("grave", "copies", "two-machines", "displaced-target", "follows-loads"),
         levels=("doubt", "remark"),
         run=lambda found: at_most_one(sides(found)), level_of=_level,

@@ -15,6 +15,7 @@ from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.diagnostics.reach import reach
 from pkmcal.diagnostics.visits import Visits, visits_of
 from pkmcal.display import chance_text, first_rows, printable
+from pkmcal.estimation.mixed_noise import of_own_noises
 from pkmcal.estimation.uncertainty import Uncertainty
 from pkmcal.fitted.solution import Solution
 from pkmcal.statistics.distributions import f_tail
@@ -67,16 +68,16 @@ class Apart:
     def __str__(self) -> str:
         if self.elsewhere:
             return (
-                f"{self.group}, measured at other places than the other rows, and these fit better"
-                f" with numbers of their own, {self.residual:.2g} times the residuals"
+                f"fitted apart, {self.group} and the other rows, which were measured at other"
+                f" places, leave residuals {self.residual:.2g} times as large"
                 f" ({chance_text(self.chance)}): the model misses something there, or the machine"
                 " was changed meanwhile; poses in another order would tell"
             )
         return (
-            f"{self.group} and the other rows are as if of two machines: with numbers of its own"
-            f" each has {self.residual:.2g} times the residuals ({chance_text(self.chance)}). Were"
-            " files joined, or was the machine changed meanwhile? Calibrate each by itself, or find"
-            " what changed by session"
+            f"{self.group} and the other rows seem to come from two machines: fitted apart, they"
+            f" leave residuals {self.residual:.2g} times as large ({chance_text(self.chance)})."
+            " Were files joined, or was the machine changed meanwhile? Calibrate each by itself, or"
+            " find what changed by session"
         )
 
 
@@ -88,7 +89,8 @@ def apart(found: Solution) -> Apart | None:
     visits = visits_of(found)
     use, key = equations_of_visits(found, visits)
     groups = dict(_groups(found, visits))
-    known = tested(found, groups, use, key)
+    fit = fit_of(found)
+    known = tested(found, fit, groups, use, key)
     seen = None
     if known:
         name = min(known, key=lambda each: known[each].chance)
@@ -97,12 +99,12 @@ def apart(found: Solution) -> Apart | None:
         seen = Apart(name, chance, best.apart, _elsewhere(found, groups[name], visits))
         if seen.found and seen.large:
             return seen
-    other = _in_no_order(found, visits, use, key)
+    other = _in_no_order(found, fit, visits, use, key)
     return other if other is not None and other.found else seen
 
 
 def equations_of_visits(found: Solution, visits: Visits) -> tuple[IntArray, IntArray]:
-    """Equations (u,) that outliers have no part in, and of which visit and component each is.
+    """Equations (u,) without outliers, and the visit and the component of each.
 
     Of mixtures each stands for itself: components of two poses are unlike.
     """
@@ -128,19 +130,37 @@ def row_of_equation(sure: Uncertainty) -> IntArray:
 
 
 def tested(
-    found: Solution, groups: Mapping[str, BoolArray], use: IntArray, key: IntArray
+    found: Solution, fit: LinearFit, groups: Mapping[str, BoolArray], use: IntArray, key: IntArray
 ) -> dict[str, Groups]:
-    """Test each group of rows (N,) against the others; without those too small to be tested."""
+    """Test each group of rows (N,) against the others; without those too small to be tested.
+
+    `fit` is that of `fit_of`.
+    """
     sure = found.fit.uncertainty
     row = row_of_equation(sure)
     cell = np.zeros(len(row), dtype=np.intp)
     for mine in groups.values():
         cell = numbered(cell, mine[row].astype(np.intp))
-    fit = _with_sets_alike(sure)
     few = few_equations(fit.design, fit.residual, use, key, cell, reach(sure, fit))
     first = np.unique(cell, return_index=True)[1]  # an equation of each cell
     every = {name: few.tested(mine[row][first][few.cell]) for name, mine in groups.items()}
     return {name: each for name, each in every.items() if each is not None}
+
+
+def fit_of(found: Solution) -> LinearFit:
+    """The fit of which equations are equally uncertain and independent of each other.
+
+    Also where a stated sigma, or that of the actuators, is wrong of some of them.
+    """
+    sure = found.fit.uncertainty
+    system = sure.equations.system
+    if system is None or sure.equations.blocks.unstated.all():
+        return _with_sets_alike(sure)
+    beyond = sure.prior_residual if sure.allowed is None else sure.allowed[1]
+    use = np.zeros(len(sure.fit.residual), dtype=bool)
+    use[equations_of_visits(found, visits_of(found))[0]] = True
+    evaluation = found.fit.estimate.evaluation
+    return of_own_noises(sure.tested, beyond, system, evaluation, sure.factors, use)
 
 
 def _with_sets_alike(sure: Uncertainty) -> LinearFit:
@@ -162,7 +182,9 @@ def _with_sets_alike(sure: Uncertainty) -> LinearFit:
     return reweighted(fit, np.exp(common - own), sure.prior_residual)
 
 
-def _in_no_order(found: Solution, visits: Visits, use: IntArray, key: IntArray) -> Apart | None:
+def _in_no_order(
+    found: Solution, fit: LinearFit, visits: Visits, use: IntArray, key: IntArray
+) -> Apart | None:
     """Test the division of the visits into two groups that fits best."""
     sure = found.fit.uncertainty
     row = row_of_equation(sure)
@@ -171,7 +193,6 @@ def _in_no_order(found: Solution, visits: Visits, use: IntArray, key: IntArray) 
     chosen = chosen[:: max(1, -(-len(chosen) // _MOST))]
     among = np.isin(visit[use], chosen)
     use, key = use[among], key[among]
-    fit = _with_sets_alike(sure)
     few = few_equations(fit.design, fit.residual, use, key, visit, reach(sure, fit))
     unit = numbered(few.cell)
     mine = best_division(few.design, few.residual, unit)

@@ -59,7 +59,7 @@ class Effect(Protocol):
 
     @property
     def name(self) -> str:
-        """As messages say it."""
+        """Name of the effect in messages."""
 
     def of_rows(self, measured: Any) -> EffectOfRows:
         """The effect in these rows; an error where what it needs was not read."""

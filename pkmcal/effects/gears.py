@@ -49,7 +49,7 @@ class Harmonics:
 
     @property
     def name(self) -> str:
-        """As messages say it."""
+        """Name of the effect in messages."""
         of = "" if self.joints == "all" else f" of joint {_listed(_several(self.joints))}"
         return f"harmonics {_listed(self._waves())}{of}"
 

@@ -58,7 +58,7 @@ class Sag:
 
     @property
     def name(self) -> str:
-        """As messages say it; products and compliances may be found together."""
+        """Name of the effect in messages; products and compliances may be found together."""
         return "tied sag" if self.tied else "sag"
 
     def __repr__(self) -> str:

@@ -176,7 +176,7 @@ class CompressedPrediction(Prediction):
 
     @property
     def guess(self) -> RowStates:
-        """Where a search for the poses begins."""
+        """Poses at which a search for the poses begins."""
         return self.whole.guess
 
     def of_set(self, i: int, pose: FloatArray, theta: FloatArray) -> Predicted:

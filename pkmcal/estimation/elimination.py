@@ -175,6 +175,20 @@ class Elimination:
         information += np.einsum("gij,hij->gh", outer, outer)
         return squares, freedom, information
 
+    def parts_of_groups(
+        self, by_unknown: FloatArray, group: IntArray, count: int
+    ) -> Iterator[tuple[IntArray, FloatArray]]:
+        """Return the share of each of the groups (E,) in the covariance of what is left.
+
+        Of n poses with m equations left: which these are (n, m), and Q₂gᵀ Q₂g, (count, n, m, m).
+        """
+        for equations, left, _, basis in self._bases(by_unknown):
+            groups = group[equations]
+            parts = [
+                (basis * (groups == g)[:, :, None]).transpose(0, 2, 1) @ basis for g in range(count)
+            ]
+            yield left, np.stack(parts)
+
     def best(
         self, machines: Machines, states: RowStates, system: Equate
     ) -> tuple[RowStates, System]:

@@ -158,7 +158,7 @@ def _seen(
 
 
 def _read(prediction: Prediction, evaluation: Evaluation, i: int, rows: IntArray) -> FloatArray:
-    """What rows of set `i` read (N, k); of readings that depend on a tool its pose."""
+    """Values (N, k) of rows of set `i`; of readings that depend on a tool its pose."""
     m = prediction.table.sets[i]
     if "tool" not in prediction.columns[i]:
         return m.values[rows]

@@ -252,7 +252,7 @@ def _reduced(basis: FloatArray) -> FloatArray:
 
 
 def _pivots(basis: FloatArray) -> list[int]:
-    """As many parameters as combinations, by which these are told apart best.
+    """Parameters, one for each combination, that tell the combinations apart best.
 
     Which they are depends on the space that the columns span alone, not on the columns: the linear
     algebra library turns these in their space as rounding has it.

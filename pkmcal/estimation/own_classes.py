@@ -1,4 +1,4 @@
-"""Check what readings and effects state of themselves that are no part of the package.
+"""Check the statements of readings and effects that are no part of the package.
 
 Their derivatives are compared with differences of their values, and every row has to be predicted
 alike wherever it stands among the others. Readings and effects of the package are tested.

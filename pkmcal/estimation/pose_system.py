@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -98,7 +99,7 @@ class PoseSystem:
         closures: FloatArray | None,
         readings: FloatArray | None = None,
     ) -> FloatArray:
-        """What is left (M, d) of changes of closures (K, e, d) and of readings (R, d), whitened.
+        """Remainder (M, d) of changes of closures (K, e, d) and of readings (R, d), whitened.
 
         One of them may be None: it does not change. Signs are those of `by_parameters`.
         """
@@ -125,6 +126,13 @@ class PoseSystem:
         """Forward to `Equations.by_groups`."""
         (_, by_unknown, _), group = self.at(evaluation, noise), self.blocks.group_of_equation
         return self.blocks.elimination.by_groups(by_unknown, group, weights, residual, leverage)
+
+    def parts_of_groups(
+        self, evaluation: Evaluation, noise: FloatArray
+    ) -> Iterator[tuple[IntArray, FloatArray]]:
+        """Forward to `Elimination.parts_of_groups`."""
+        (_, by_unknown, _), group = self.at(evaluation, noise), self.blocks.group_of_equation
+        return self.blocks.elimination.parts_of_groups(by_unknown, group, len(self.blocks.unstated))
 
     def closures_alone(
         self, evaluation: Evaluation, noise: FloatArray, left: FloatArray, least: int

@@ -105,7 +105,7 @@ class TensionedPoses(FreePoses):
         return super().settled(robot, states)
 
     def _rows(self, robot: Calibratable, states: RowStates) -> tuple[FloatArray, FloatArray]:
-        """As for `FreePoses`; kept for the last states, of which a step asks several times."""
+        """Rows as of `FreePoses`; kept for the last states, of which a step asks several times."""
         known = self._cache.get("rows")
         if known is not None and known[0] is robot and known[1] is states:
             _, _, off, by_step = known

@@ -45,7 +45,7 @@ class Whitening:
 
     @classmethod
     def of(cls, sets: Sequence[Measurements], length: float) -> Whitening:
-        """As the sets state their sigma, on a machine of this length in mm."""
+        """Whitening by the sigma of the sets, on a machine of this length in mm."""
         every = np.arange(len(sets))
         return cls(
             tuple(_whitening(m, length) for m in sets),

@@ -163,7 +163,7 @@ class Table:
         rows = [(line, _fitted(cells, names, packed)) for line, cells in header.rows if any(cells)]
         again = {line: None for line, cells in rows if cells == names}
         if again and header.line:
-            self.notes.append(f"column names once more in line {next(iter(again))}, left out")
+            self.notes.append(f"line {next(iter(again))} repeats the column names and is left out")
             rows = [(line, cells) for line, cells in rows if line not in again]
         if not rows:
             raise FileError(f"{self.path}: no rows below the column names of line {header.line}")

@@ -1,9 +1,10 @@
 """A file that states the SHA-256 of the rest of itself: whether it is as it was written.
 
 What has no seal, or another content than it states, is somebody's work. The seal stands where the
-format has room for a remark: a comment of CSV, TOML, YAML, HTML, SVG, XML, URDF, C, ini and hal
-files, the first key of JSON, a text chunk before the end of PNG, a comment at the end of PDF. Other
-files, a printer's configuration and G-code among them, are their owner's and have no seal.
+format has room for a remark: a comment of CSV, TOML, HTML, SVG, XML, URDF, C, ini and hal files
+and of a lens file in YAML, the first key of JSON, a text chunk before the end of PNG, a comment at
+the end of PDF. Other files, a machine's configuration in YAML, in a printer's form or in G-code
+among them, are their owner's and have no seal.
 """
 
 from __future__ import annotations
@@ -16,15 +17,20 @@ from dataclasses import dataclass
 
 _WORDS = "sha256 of the rest"
 _IEND = 12  # bytes that end a PNG file
+_OPENCV = b"%YAML:1.0\n---\n"  # the head of its YAML files, which has to stay the first
 
 
 @dataclass(frozen=True)
 class _Form:
-    """The form of a seal and its place: after so many bytes, or before so many."""
+    """The form of a seal and its place: after so many bytes, or before so many.
+
+    A content without the `head` has no seal.
+    """
 
     written: Callable[[str], bytes]
     after: int | None = None
     before: int = 0
+    head: bytes = b""
 
     def place(self, length: int) -> int:
         """Return the seal's place in a content of this length without it."""
@@ -60,7 +66,7 @@ _FORMS = {
     ".csv": _Form(_line, after=0),
     ".toml": _Form(_line, after=0),
     ".ini": _Form(_line, after=0),
-    ".yaml": _Form(_line, after=len("%YAML:1.0\n---\n")),
+    ".yaml": _Form(_line, after=len(_OPENCV), head=_OPENCV),
     ".hal": _Form(_line, after=0),
     ".h": _Form(_remark_in_c, after=0),
     ".c": _Form(_remark_in_c, after=0),
@@ -93,16 +99,11 @@ def sealed(content: bytes, kind: str) -> bytes:
     1
     <BLANKLINE>
     """
-    if not has_seals(kind):
+    form = _FORMS.get(kind)
+    if form is None or not content.startswith(form.head):
         return content
-    form = _FORMS[kind]
     at = form.place(len(content))
     return content[:at] + form.written(hashlib.sha256(content).hexdigest()) + content[at:]
-
-
-def has_seals(kind: str) -> bool:
-    """Return whether files of a kind, such as ".csv", have a seal."""
-    return kind in _FORMS
 
 
 def is_sealed(content: bytes, kind: str) -> bool:
@@ -114,9 +115,9 @@ def is_sealed(content: bytes, kind: str) -> bool:
     >>> is_sealed(written, ".csv"), is_sealed(written + b"2\n", ".csv")
     (True, False)
     """
-    if not has_seals(kind):
+    form = _FORMS.get(kind)
+    if form is None or not content.startswith(form.head):
         return False
-    form = _FORMS[kind]
     size = len(form.written("0" * 64))
     at = form.place(len(content) - size)
     return at >= 0 and sealed(content[:at] + content[at + size :], kind) == content

@@ -49,7 +49,7 @@ class CalibratedPicture:
 def parts_of(
     found: Solution,
 ) -> Iterator[tuple[Equations, Evaluation, Evaluation, Use, tuple[int, ...]]]:
-    """Equations of rows before and after, what became of these, and outliers among them."""
+    """Equations of rows, their start and end, whether they were fitted, and outliers among them."""
     fit = found.fit
     yield fit.equations, fit.start, fit.end, "fitted", found.outliers
     later = found.holdout_later
@@ -82,7 +82,7 @@ def instruments(
 
 
 def pictures(found: Solution) -> Iterator[CalibratedPicture]:
-    """What each picture shows, in the order of rows: fitted ones, those held out, those left out.
+    """Pictures in the order of rows: fitted ones, those held out, those left out.
 
     How far each is off is against the machine where its actuators say that it is.
     """

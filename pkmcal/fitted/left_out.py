@@ -63,7 +63,7 @@ class Comparison:
         return self.after <= (1.0 - LEAST_GAIN) * self.before and self.t > LEAST_T
 
     def __str__(self) -> str:
-        return f"poses left out: {self.before:.3f} → {self.after:.3f} mm"
+        return f"the error at poses left out goes from {self.before:.3f} to {self.after:.3f} mm"
 
 
 def compared_by_poses(

@@ -47,12 +47,12 @@ class Spring:
 
     @property
     def moves(self) -> tuple[tuple[str, float], ...]:
-        """Numbers of limbs that it moves, and by how much as it yields by 1."""
+        """Numbers of limbs that the spring moves, and by how much as it yields by 1."""
         return self.followers or ((self.number, 1.0),)
 
     @property
     def of_drive(self) -> bool:
-        """True if it is that of one leg, screw or crank."""
+        """True if the spring is that of one leg, screw or crank."""
         return self.number.startswith("offset") and not self.followers
 
     @property

@@ -70,7 +70,7 @@ class StatedUncertainty:
         )
 
     def table(self) -> dict[str, Any]:
-        """As it stands in a robot file, and as `identify` takes it."""
+        """The statement as a robot file has it, and as `identify` takes it."""
         beside = {COMMON: dict(self.common), CONSIDER: dict(self.consider)}
         return dict(self.own) | {key: own for key, own in beside.items() if own}
 

@@ -18,7 +18,7 @@ class Term(NamedTuple):
 
     @property
     def written(self) -> float | str:
-        """As a robot file has it."""
+        """The tie as a robot file has it."""
         if self.name is None:
             return self.factor
         return self.name if self.factor > 0.0 else f"-{self.name}"

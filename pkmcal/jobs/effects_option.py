@@ -37,7 +37,7 @@ def read_effects(given: Sequence[str]) -> list[Any] | Literal["auto"]:
 
 
 def with_effects(given: Sequence[str], more: Sequence[Any]) -> tuple[str, ...]:
-    """Words of effects with more, which stand in for those of their names."""
+    """Add words of effects, which replace those of the same name."""
     names = {each.name for each in more}
     stated = [word for word in _words(given) if word not in ("none", AUTO)]
     kept = (word for word in stated if _effect(word).name not in names)

@@ -92,7 +92,7 @@ class Driven:
         self._run.stop()
 
     def close(self) -> None:
-        """Free what was opened; who does not answer any more has said so before."""
+        """Close log, machine and instrument; who does not answer any more has said so before."""
         _close([self.log, *self._devices])
 
 
@@ -187,7 +187,7 @@ def _close(opened: list[Any]) -> None:
 
 
 def _noise_of(job: Planning) -> tuple[bool, Planning]:
-    """Whether the noise is stated, and the plan with a number for it."""
+    """Read the noise: True if it is stated, and the plan with a number for it."""
     if job.noise == UNKNOWN:
         return False, replace(job, noise=str(UNSTATED))
     return True, job
@@ -247,7 +247,7 @@ def _words(
     robot: Robot,
     out: str,
 ) -> str:
-    """What is going to happen, for the person who starts it."""
+    """Announcement of the moves, for the person who starts them."""
     low, high = candidates[:, :3].min(axis=0), candidates[:, :3].max(axis=0)
     ends = ", ".join(f"{axis} {a:g} to {b:g}" for axis, a, b in zip("xyz", low, high, strict=True))
     over = (

@@ -200,6 +200,6 @@ def _number(value: float) -> str:
 
 
 def _beside(made: Plan, k: int) -> str:
-    """What is done at a pose where that is not the same at all."""
+    """Comment on a pose: its kind of reading and its load, where poses differ in them."""
     said = f": {made.kinds[k]}" if len(set(made.kinds)) > 1 else ""
     return said if made.load is None else f"{said}, carrying {np.asarray(made.load.mass)[k]:g} kg"

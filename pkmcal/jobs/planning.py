@@ -41,6 +41,7 @@ from pkmcal.planning.planned import UNKNOWN
 from pkmcal.readings.registry import Kind
 
 _RINGS = 8  # of places on the bed
+_WHOLE = 1e-3  # mm, of the places that a probe goes to
 DRAWN, _SHARE = 500, 0.9  # candidates where none are given, and how far out they reach
 
 
@@ -123,7 +124,7 @@ def planned(job: Planning, sources: Sources) -> Plan:
 
 
 def options(job: Planning, sources: Sources) -> dict[str, Any]:
-    """What plans and the choice of a next pose take alike, beside machine and candidates.
+    """Arguments that plans and the choice of a next pose share, beside machine and candidates.
 
     Raises
     ------
@@ -159,7 +160,7 @@ def candidates(job: Planning, sources: Sources) -> FloatArray:
 
 
 def axis(text: str) -> list[float]:
-    """What ``--direction`` states: x, y or z of the base, or three numbers.
+    """The direction of ``--direction``: x, y or z of the base, or three numbers.
 
     Raises
     ------
@@ -318,7 +319,7 @@ def _on_bed(machine: Robot | SerialArm) -> FloatArray:
         turns = 2.0 * np.pi * np.arange(6 * ring) / (6 * ring)
         rings.append(min(ends) * ring / _RINGS * np.stack([np.cos(turns), np.sin(turns)], axis=1))
     poses = np.zeros((sum(map(len, rings)), 6))
-    poses[:, :2] = np.concatenate(rings)
+    poses[:, :2] = np.trunc(np.concatenate(rings) / _WHOLE) * _WHOLE  # no rounding leads beyond it
     reached: FloatArray = poses[good_poses(machine, poses)]
     if not len(reached):
         raise ArgumentError(f"--kind probe: {machine.name} reaches nothing of its bed at z = 0")

@@ -93,7 +93,7 @@ def read_file(
 
 
 class Pnp(NamedTuple):
-    """What ``--from-pnp`` states.
+    """The statement of ``--from-pnp``.
 
     Attributes
     ----------

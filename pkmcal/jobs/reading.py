@@ -1,4 +1,4 @@
-"""How files of measurements are read: one object for options and tables."""
+"""Options that say how files of measurements are read: one object for options and tables."""
 
 from __future__ import annotations
 

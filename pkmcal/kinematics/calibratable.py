@@ -105,11 +105,11 @@ class Declarations(Protocol):
 
     @property
     def elastic(self) -> Elastic | None:
-        """What yields of the limbs, and what pulls at it."""
+        """Springs of the limbs, and the loads on them."""
 
     @property
     def load(self) -> CableLoad | None:
-        """What acts on a platform on cables."""
+        """The load on a platform on cables."""
 
     @property
     def balanced_load(self) -> CableLoad | None:
@@ -129,7 +129,7 @@ class Calibratable(Protocol):
 
     @property
     def kind(self) -> Literal["parallel", "arm"]:
-        """What it is."""
+        """Kind of the machine."""
 
     @property
     def name(self) -> str:
@@ -164,7 +164,7 @@ class Calibratable(Protocol):
         """Name and unit of what a user commands: coordinates of the pose, or of an arm's joints."""
 
     def as_commands(self, pose: FloatArray, actuators: FloatArray) -> FloatArray:
-        """What a user commands to have these poses (N, 6) by these coordinates (N, n)."""
+        """Commands of a user that lead to poses (N, 6) by coordinates (N, n)."""
 
     @property
     def passive_names(self) -> tuple[str, ...]:
@@ -187,7 +187,7 @@ class Calibratable(Protocol):
         """The machine with drives under tension (N, n), N; an arm does not follow it."""
 
     def under(self, load: Load) -> Calibratable:
-        """The machine under what its platform or tool carries."""
+        """The machine under the load of its platform or tool."""
 
     def forward(self, q: FloatArray, guess: FloatArray | None = None) -> SolvedRows:
         """Poses at actuator coordinates (N, n)."""

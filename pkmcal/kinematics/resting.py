@@ -151,7 +151,7 @@ class RestingMachine(CoreMachine):
         )
 
     def _of_springs(self, by_column: FloatArray) -> FloatArray:
-        """What is by the numbers that move (…, c), by those that yield (…, s)."""
+        """Derivatives by the numbers that yield (…, s), from those by numbers that move (…, c)."""
         return by_column if self._moves is None else by_column @ self._moves.T
 
     def numbers(self, slots: FloatArray) -> FloatArray:

@@ -722,7 +722,7 @@ _COMPUTED = frozenset(
 
 
 def determines_others(robot: Robot) -> bool:
-    """Whether the limbs determine other coordinates than the commanded ones, not constant."""
+    """True if the limbs determine further coordinates that are not constant."""
     constant = robot.model.match is None and robot.model.map in ("translation", "planar", "xy")
     return len(robot.moved) < len(POSE) and not constant
 

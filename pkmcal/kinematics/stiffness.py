@@ -233,7 +233,7 @@ def _of_robot(robot: Robot, rows: FloatArray) -> tuple[FloatArray, FloatArray, F
 
 
 def _of_arm(arm: SerialArm, theta: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """As `_of_robot`, of the joints of an arm at their commands (N, n)."""
+    """Twists, compliances and stand as `_of_robot`, of an arm at commands (N, n)."""
     yields = {
         term.joint: value
         for term, value in arm.joint_laws.numbers.items()
@@ -351,7 +351,7 @@ def _robot_under(
 def _arm_under(
     arm: SerialArm, theta: FloatArray, load: Load | None, forces: FloatArray
 ) -> FloatArray:
-    """As `_robot_under`, at commands (1, n) of an arm."""
+    """Places as `_robot_under`, of an arm at commands (1, n)."""
     there = arm.under(_with_force(Load() if load is None else load, forces))
     found: FloatArray = there.forward(np.repeat(theta, len(forces), axis=0))[:, :3, 3]
     return found

@@ -59,7 +59,7 @@ class Odd:
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """What rows have told so far. `after` makes that of one more pose.
+    """State of a measurement after the rows so far; `after` adds the rows of one more pose.
 
     Attributes
     ----------
@@ -112,7 +112,7 @@ class Course:
 
     @property
     def reached(self) -> bool:
-        """Whether the accuracy is there, and nothing speaks against it.
+        """True if the accuracy is reached, and nothing speaks against it.
 
         Not the newest rows, and the scatter of all has had the chance to.
         """
@@ -122,7 +122,7 @@ class Course:
 
     @property
     def over(self) -> bool:
-        """Whether there is nothing more to measure."""
+        """True if there is nothing more to measure."""
         return self.reached or not self.choice.left or self.poses == self.count
 
     def after(self, index: int, rows: Measurements) -> Course:
@@ -181,7 +181,7 @@ class Course:
 
 
 def _odd(found: Identification[Any] | None) -> Odd | None:
-    """Whether rows that were held out contradict those before."""
+    """Contradiction of rows that were held out and those before; None without one."""
     if found is None or found.dof < 1 or not found.holdout_chance < CHANCE:
         return None
     return Odd(found.holdout_rms, found.holdout_expected, found.holdout_chance)

@@ -1,4 +1,4 @@
-"""What a measurement that goes on says of itself, for a terminal and for a page."""
+"""Messages of a measurement that goes on, for a terminal and for a page."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from pkmcal.live.course import Course
 
 
 def line(course: Course) -> str:
-    """How many rows there are, and what they predict."""
+    """Numbers of poses and rows, and the predicted error."""
     rows = 0 if course.rows is None else len(course.rows)
     return f"{_many(course.poses, 'pose')}, {_many(rows, 'row')}: {predicted(course)}"
 
 
 def warnings(course: Course) -> list[str]:
-    """What speaks against the newest rows."""
+    """Doubts about the newest rows."""
     found = []
     if course.odd is not None:
         found.append(f"the newest rows contradict the others: {course.odd}")
@@ -36,25 +36,25 @@ def predicted(course: Course) -> str:
 
 
 def conclusion(course: Course) -> list[str]:
-    """How it ended, a line each."""
+    """Lines on how the measurement ended."""
     found = []
     dilution = course.choice.dilution
     if course.stated and dilution == dilution:
         found.append(
-            f"dilution {dilution:.2g}: so many times the noise of a reading arrives at the targets,"
-            " whatever the errors of the machine"
+            f"dilution {dilution:.2g}: the error predicted at the targets is {dilution:.2g} times"
+            " the noise of a reading, whatever the errors of the machine"
         )
     if course.reached:
         end = "enough"
     elif course.accuracy is None:
-        end = "measured as many as asked"
+        end = "all the poses that were asked for are measured"
     else:
-        end = f"not the {course.accuracy:g} mm asked for"
+        end = f"the {course.accuracy:g} mm that were asked for are not reached"
     return [*found, f"{predicted(course)}: {end}"]
 
 
 def stopped(rows: int, path: str) -> str:
-    """What is there of a measurement that was stopped."""
+    """Line on the rows of a measurement that was stopped."""
     return f"stopped with {_many(rows, 'row') if rows else 'no row'} in {path}"
 
 

@@ -1,4 +1,4 @@
-"""What a machine and an instrument have to answer, so that a measurement can be made with them.
+"""Interfaces of a machine and of an instrument with which a measurement can be made.
 
 A kind of machine or instrument is one file with one class, named in `registry`. One that asks a
 person has ``ASKS = True`` and takes a third argument: what asks, a terminal or a page.
@@ -23,7 +23,7 @@ class DeviceError(Error):
 
 @contextmanager
 def understood(what: str) -> Iterator[None]:
-    """Say that an answer has another form than its maker's pages give it.
+    """Refuse an answer of another form than its maker documents.
 
     Raises
     ------
@@ -39,7 +39,7 @@ def understood(what: str) -> Iterator[None]:
 
 
 class Where(NamedTuple):
-    """What a controller says of where its machine is.
+    """Place of a machine, as its controller reports it.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ class Machine(Protocol):
         """Drive straight to a pose (6,), at a feed in mm/min, and return when it stands still."""
 
     def where(self) -> Where:
-        """What its controller says of where it is."""
+        """Place of the machine, as its controller reports it."""
 
     def stop(self) -> None:
         """Stop at once, whatever it does; called from any thread, also while `go` waits."""

@@ -87,17 +87,16 @@ class Server:
             self.address + path + asked, method=method, headers=self.headers
         )
         try:
-            with self._open(request, timeout=wait) as answer:
+            with self._answer(request, wait) as answer:
                 found = b""
                 while len(found) <= _LONGEST and (some := answer.read1(_LONGEST)):
                     found += some
                     if time.monotonic() > end:
                         raise TimeoutError("its answer does not end")
+                if isinstance(answer, urllib.error.HTTPError):
+                    raise RefusedError(f"{self._what}: {_said(answer, found)}", answer.code)
                 if len(found) <= _LONGEST and answer.length:
                     raise DeviceError(f"{self._what} broke off: half an answer")
-        except urllib.error.HTTPError as error:
-            with error:
-                raise RefusedError(f"{self._what}: {_said(error)}", error.code) from None
         except (OSError, ValueError, urllib.error.URLError) as error:
             reason = getattr(error, "reason", None) or error
             raise DeviceError(f"{self._what} does not answer: {reason}") from None
@@ -109,12 +108,18 @@ class Server:
             raise DeviceError(f"{self._what}: an answer of more than {_LONGEST} bytes")
         return found.decode("utf-8", "replace")
 
+    def _answer(self, request: urllib.request.Request, wait: float) -> Any:
+        """Return the answer, that of an error too: its body is read with the same limits."""
+        try:
+            return self._open(request, timeout=wait)
+        except urllib.error.HTTPError as error:
+            return error
 
-def _said(error: urllib.error.HTTPError) -> str:
-    """What a server says of its error, in its own words where it has some."""
-    body = error.read(_LONGEST).decode("utf-8", "replace")
+
+def _said(error: urllib.error.HTTPError, body: bytes) -> str:
+    """Text of a server's error, in its own words where it has some."""
     try:
         message = json.loads(body)["error"]["message"]
-    except (ValueError, KeyError, TypeError):
+    except (ValueError, KeyError, TypeError, RecursionError):
         message = error.reason
     return f"{error.code}, {message}"

@@ -78,7 +78,7 @@ class Lines:
         return line.decode("utf-8", "replace").strip()
 
     def answer(self, taken: Callable[[str], _T | None]) -> _T:
-        """What the first line that is an answer says; others are passed over, for a time.
+        """Return the content of the first line that is an answer; pass over others, for a time.
 
         Parameters
         ----------

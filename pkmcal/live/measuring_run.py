@@ -35,7 +35,7 @@ class Stopped(Exception):
 
 @dataclass(frozen=True)
 class Rules:
-    """How poses are measured.
+    """Rules by which poses are measured.
 
     Attributes
     ----------
@@ -110,7 +110,10 @@ class MeasuringRun:
             actuators = self._arrived(pose)
             values = self._read(f"row {_count(course) + 1}, at {pose_words(pose)}")
             if values is None:
-                self._tell(f"at {pose_words(pose)} nothing was seen: no row, and not again")
+                self._tell(
+                    f"at {pose_words(pose)} nothing was seen: this pose has no row and is not tried"
+                    " again"
+                )
                 course = course.without(index)
                 continue
             self._log.append(actuators, values, round(time.time(), 1))
@@ -132,7 +135,7 @@ class MeasuringRun:
             try:
                 self._machine.stop()
             except DeviceError as error:
-                self._tell(f"the machine did not take the stop, stop it by hand: {error}")
+                self._tell(f"the machine did not obey the stop: stop it by hand ({error})")
 
         stopping = threading.Thread(target=stop)
         stopping.start()

@@ -93,7 +93,7 @@ class Moonraker:
         )
 
     def where(self) -> Where:
-        """Where toolhead and steppers are: what offsets and meshes have made of the command."""
+        """Places of toolhead and steppers: offsets and meshes have been added to the command."""
         said = self._position()
         toolhead, steppers = _TOOLHEAD.search(said), _STEPPERS.search(said)
         heights = dict(re.findall(rf"(\w+):{_NUMBER}", steppers[1])) if steppers else {}
@@ -120,7 +120,7 @@ class Moonraker:
         self._server.ask("/printer/gcode/script", "POST", wait=_MOVE, script=script)
 
     def _position(self) -> str:
-        """What GET_POSITION answers: the newest of its answers, and one that is new."""
+        """Newest answer of GET_POSITION that was not there before."""
         last = max((time for time, _ in self._answers()), default=-1.0)
         for turn in range(_ASKED * _TRIED):
             if turn % _TRIED == 0:  # just restarted, Moonraker may not have heard the first

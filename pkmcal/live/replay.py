@@ -16,7 +16,7 @@ from pkmcal.measurements.measurements import Measurements
 
 
 def places(robot: Robot | SerialArm, log: Measurements) -> tuple[FloatArray, list[IntArray]]:
-    """Where each pose of a log was measured, in the order of their first rows, and its rows.
+    """Places of the poses of a log, in the order of their first rows, and the rows of each.
 
     Returns
     -------

@@ -78,7 +78,7 @@ class RepRap:
             sleep(_PAUSE)
 
     def where(self) -> Where:
-        """Where its axes are; it says nothing of its motors that the robot file could count."""
+        """Place of the axes; the board reports no motors that the robot file could count."""
         return Where(np.array([*self._place(), 0.0, 0.0, 0.0]))
 
     def stop(self) -> None:

@@ -150,7 +150,7 @@ class RowLog:
         )
 
     def _headings(self) -> list[str]:
-        """Those of the columns, which are the same whatever the numbers are."""
+        """Headings of the columns, which are the same whatever the numbers are."""
         home = [np.zeros(self._robot.n_actuators)]
         none = [np.zeros(len(self._kind.components))]
         return headed_cells(self._measured(home, none, [0.0]), self._units)[0]

@@ -1,4 +1,4 @@
-"""Other numbers of the rows, of which readings and effects of a user's own know what they are."""
+"""Further numbers of the rows, for readings and effects of a user's own."""
 
 from __future__ import annotations
 

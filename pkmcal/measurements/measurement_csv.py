@@ -389,9 +389,9 @@ def _require_nothing_measured(table: Table) -> None:
     """Refuse a table whose unknown columns have units: they were measured, by something."""
     if measured := [name for name, unit in table.left_out.items() if unit is not None]:
         raise table.header_error(
-            f"nothing in it is known to be measured; column {measured[0]!r} is unknown: a reading"
-            " of a class of your own is named by kind=…, as kind=Loop(); without one, columns that"
-            f" do not matter are left out, --ignore {measured[0]!r} (ignore=)"
+            f"no column of a known reading; column {measured[0]!r} is unknown. If a class of your"
+            " own reads it, name the class: kind=…, as kind=Loop(). If it does not matter, leave it"
+            f" out: --ignore {measured[0]!r} (ignore=)"
         )
 
 

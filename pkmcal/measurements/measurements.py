@@ -436,7 +436,7 @@ class Measurements(Result):
         return measurements_of_frame(frame, robot, **options)
 
     def _columns(self) -> dict[str, Any]:
-        """As the columns of a file, but for the units, which are mm and rad."""
+        """Columns as of a file, but for the units, which are mm and rad."""
         columns: dict[str, Any] = {f"q{i + 1}": q for i, q in enumerate(self.actuators.T)}
         values = self.values.reshape(len(self), -1)
         columns |= dict(zip(self.components, values.T, strict=True))

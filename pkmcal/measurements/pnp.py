@@ -115,7 +115,7 @@ def _corners(pose: FloatArray, board: Board | Sequence[float]) -> FloatArray:
 
 
 def _middle(pose: FloatArray) -> FloatArray:
-    """Where on a board (2,) lines of sight meet its plane, the median; its origin if none does."""
+    """Point of a board (2,), the median, where lines of sight meet its plane; else its origin."""
     camera = np.linalg.inv(screws.frames(pose))
     eye, ahead = camera[:, :3, 3], camera[:, :3, 2]
     meets = np.abs(ahead[:, 2]) > np.cos(_SLANTING)

@@ -24,7 +24,7 @@ _OF_A_TARGET = re.compile(r"(?P<target>.+)\.[xyz]")
 
 
 class TargetIndex(Field):
-    """Which target each row measured, of several, counted from 0; its columns say its place."""
+    """Index of the target of each row, of several, counted from 0; its columns say its place."""
 
     def kept(self, given: Any, m: Any) -> Int64Array:
         """Check whole numbers (N,)."""

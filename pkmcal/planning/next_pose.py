@@ -1,4 +1,4 @@
-"""Which pose to measure next, beside rows that are there: a measurement that goes on."""
+"""The pose to measure next, beside rows that are there: a measurement that goes on."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class NextPose(Result):
 
     @property
     def parameters(self) -> tuple[str, ...]:
-        """What the calibration is to find."""
+        """Names of the numbers that the calibration is to find."""
         return self._choice.parameters.names
 
     @property
@@ -58,12 +58,12 @@ class NextPose(Result):
 
     @property
     def left(self) -> int:
-        """How many candidates have not been measured."""
+        """Number of candidates that have not been measured."""
         return int(self._free.sum())
 
     @property
     def index(self) -> int:
-        """Which of the candidates to measure.
+        """Index of the candidate to measure.
 
         Raises
         ------
@@ -74,13 +74,13 @@ class NextPose(Result):
 
     @property
     def pose(self) -> FloatArray:
-        """Its pose (6,), mm and rad."""
+        """Pose of that candidate (6,), mm and rad."""
         pose: FloatArray = self._choice.poses[self._best]
         return pose
 
     @property
     def actuators(self) -> FloatArray:
-        """What leads there (n,), mm and rad."""
+        """Actuators of that pose (n,), mm and rad."""
         actuators: FloatArray = self._choice.actuators[self._best]
         return actuators
 
@@ -138,7 +138,7 @@ class NextPose(Result):
         return int(places[0])
 
     def _but(self, at: int) -> dict[str, Any]:
-        """What is left to choose from without a candidate."""
+        """Fields of the choice that is left without a candidate."""
         free = self._free.copy()
         free[at] = False
         return {"_free": free, "_first": tuple(each for each in self._first if each != at)}

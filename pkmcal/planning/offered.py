@@ -1,4 +1,4 @@
-"""What a plan has to choose from: candidates that can be measured, and what each would bring."""
+"""The choice of a plan: candidates that can be measured, and the information of each."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ def offered(
     effects: Effects,
     measured: Measurements | None,
 ) -> Offered:
-    """What can be chosen from; arguments as `plan_poses` takes them.
+    """Candidates to choose from; arguments as `plan_poses` takes them.
 
     Raises
     ------
@@ -230,7 +230,7 @@ def _before(
 
 
 def _of(name: str, given: Any, kind: Planned, kinds: Sequence[Planned]) -> Any:
-    """What was given of one kind: one for all, or by kind."""
+    """Value of an argument for one kind: one for all, or by kind."""
     if not isinstance(given, Mapping):
         return given
     for each in given:
@@ -290,7 +290,7 @@ def _within_limits(
 
 
 def _safe(chosen: Parameters, poses: FloatArray, q: FloatArray) -> BoolArray:
-    """Which candidates machines with errors reach, too: none beside a singularity."""
+    """Mask of candidates that machines with errors reach, too: none beside a singularity."""
     k = len(chosen.places)
     sigma = np.minimum(chosen.prior, _ERROR * chosen.scale)[:k]
     random, values = np.random.default_rng(0), chosen.robot.geometry.values

@@ -132,7 +132,7 @@ class Design:
         return self._exchanged(found[first_largest(-costs, TIED)], ridge)
 
     def reaching(self, error: float) -> IntArray:
-        """As few candidates as predict an error (mm) that all together do."""
+        """Choose as few candidates as predict an error (mm) that all together reach."""
         error *= 1.0 + _ROUNDED
         nothing = np.array([], dtype=np.intp)
         if self.predicted(nothing) <= error:
@@ -153,7 +153,7 @@ class Design:
         return made
 
     def fewest(self) -> int:
-        """How many candidates it takes at least to identify what those that are there do not."""
+        """Least number of further candidates that identify all numbers."""
         nothing = np.array([], dtype=np.intp)
         information = np.linalg.eigvalsh(self._information(nothing))
         lacking = int((information < _NOTHING).sum())
@@ -370,6 +370,6 @@ class Design:
 
 
 def _times(blocks: FloatArray, matrix: FloatArray) -> FloatArray:
-    """Blocks (N, k, n) times a matrix (n, n), in one product, which takes less time than N."""
-    product: FloatArray = (blocks.reshape(-1, len(matrix)) @ matrix).reshape(*blocks.shape[:2], -1)
-    return product
+    """Blocks (..., n) times a matrix (n, m), in one product, which takes less time than many."""
+    product: FloatArray = blocks.reshape(-1, len(matrix)) @ matrix
+    return product.reshape(*blocks.shape[:-1], -1)

@@ -139,8 +139,9 @@ class Plan(Result):
         )
         if np.isfinite(self.dilution):
             yield (
-                f"dilution {self.dilution:.2g}: so many times the noise of a reading arrives at the"
-                " targets, whatever the errors of the machine"
+                f"dilution {self.dilution:.2g}: the error predicted at the targets is"
+                f" {self.dilution:.2g} times the noise of a reading, whatever the errors of the"
+                " machine"
             )
         if self.travel_weight:
             yield (

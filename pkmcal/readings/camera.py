@@ -216,7 +216,7 @@ class Camera(Reading):
 
     @property
     def motions(self) -> Mapping[str, FloatArray]:
-        """Motions (4, 4), mm, of a camera whose place is known, by what they take to what.
+        """Motions (4, 4), mm, of a camera whose place is known, by the frames they lead between.
 
         Of a camera on the base ``base_to_camera`` and ``board_to_platform``, of one on the platform
         ``base_to_board`` and ``camera_to_platform``, which others call hand-eye calibration.

@@ -196,7 +196,7 @@ class Between(Reading):
         return self.with_fields(fields), values
 
     def approached(self, actuators: FloatArray, first: FloatArray | None) -> FloatArray | None:
-        """As stated, or from the first place."""
+        """Approach as stated, or from the first place."""
         if self.approach is not None:
             return np.asarray(self.approach, dtype=np.float64)
         if first is None:

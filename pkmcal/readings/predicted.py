@@ -1,4 +1,4 @@
-"""Where a machine is when something is read, and what should be read there."""
+"""States of a machine when something is read, and the predicted readings."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MOTION = 6  # numbers of the motion of a lot of rows: ω, then v
 
 @dataclass(frozen=True, eq=False)
 class At:
-    """Where a machine is when something is read.
+    """State of a machine when something is read.
 
     Attributes
     ----------

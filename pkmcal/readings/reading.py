@@ -274,7 +274,7 @@ class Reading:
 
     @property
     def motions(self) -> Mapping[str, FloatArray]:
-        """Motions (4, 4) of an instrument as it was found, by what they take to what; mm."""
+        """Motions (4, 4), mm, of an instrument as it was found, by the frames they lead between."""
         return {}
 
     def write(self, path: str | PathLike[str], comment: str = "") -> None:

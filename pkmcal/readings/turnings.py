@@ -143,7 +143,7 @@ class Tilt(Orientation):
     frame_order = 4
 
     def frame(self, seen: Sighting) -> Laid:
-        """As level as the robot file says."""
+        """Place the base as level as the robot file says."""
         return np.zeros(6), {}
 
     def predict(self, at: At, mounting: FloatArray = _ORIGIN, **numbers: FloatArray) -> Predicted:

@@ -183,7 +183,7 @@ def _same_heat(found: Identification, stated: Statement) -> None:
     room = max(stated.temperature_uncertainty, _ROUNDED)
     if read and (mean < read[0] - room or mean > read[1] + room):
         raise ArgumentError(
-            f"certificate: [temperature] mean: states {mean:g} °C, measured were"
+            f"certificate: [temperature] mean states {mean:g} °C, and the measurements have"
             f" {read[0]:.4g} to {read[1]:.4g} °C"
         )
     used, per_kelvin = sorted(found.expansion.values()), stated.expansion
@@ -191,8 +191,8 @@ def _same_heat(found: Identification, stated: Statement) -> None:
     if used and (per_kelvin < used[0] - room or per_kelvin > used[-1] + room):
         given = " to ".join(f"{value:g}" for value in sorted({used[0], used[-1]}))
         raise ArgumentError(
-            f"certificate: [temperature] expansion: states {per_kelvin:g}/K, calibrated was with"
-            f" {given}/K"
+            f"certificate: [temperature] expansion states {per_kelvin:g}/K, and the calibration"
+            f" used {given}/K"
         )
 
 
@@ -218,7 +218,7 @@ def _beyond(scatter: float, noise: float) -> float:
 def _of_noise(noise: float) -> str:
     """Say whether a scatter holds the noise of the instrument."""
     if noise:
-        return f"less the noise of the instrument, {noise:.3g} mm, which its U holds"
+        return f"without the noise of the instrument, {noise:.3g} mm, which is part of its U"
     return "noise of the instrument included"
 
 
@@ -251,8 +251,8 @@ def _misfit(found: Identification, stated: Statement) -> list[Contribution]:
             "repeatability and lack of fit",
             _beyond(float(np.sqrt(known.mean())), noise),
             dof=max(sure.fit.freedom, 0.0) or float("inf"),
-            remark=f"residuals, {_of_noise(noise)}; no pose was repeated, which would tell one"
-            " from the other",
+            remark=f"residuals, {_of_noise(noise)}; only repeated poses would tell repeatability"
+            " from lack of fit",
         )
     ]
 
@@ -266,8 +266,8 @@ def _shown(stated: Statement, read: tuple[float, float] | None) -> str:
 def _reference(found: Identification) -> str:
     """State the temperature at which the machine's lengths are those identified."""
     if found.expansion:
-        return f"{REFERENCE:g} °C (ISO 1): the lengths stated are those at it"
-    return f"{REFERENCE:g} °C (ISO 1): not reduced to it, lengths are as at the measurement"
+        return f"{REFERENCE:g} °C (ISO 1): the stated lengths are corrected to it"
+    return f"{REFERENCE:g} °C (ISO 1): lengths are not corrected to it, but as measured"
 
 
 def _expansion(found: Identification, stated: Statement) -> str:

@@ -37,7 +37,7 @@ def laws(robot: Robot) -> list[dict[str, Any]] | None:
     if not isinstance(machine, DrivenMachine):
         return None
     if machine.tension is not None:
-        raise ArgumentError(f"robot: {robot.name} is under tension, which the page cannot hold")
+        raise ArgumentError(f"robot: {robot.name} is under tension, which the page cannot draw")
     numbers = robot.slots.ravel().tolist()
     approach = np.zeros(robot.n_actuators) if machine.approach is None else machine.approach
     found = []

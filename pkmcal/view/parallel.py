@@ -44,7 +44,7 @@ def data(robot: Robot, cloud: bool) -> dict[str, Any]:
     machine, slots = drives.within(robot)
     laws = drives.laws(robot)
     if what := beyond(model):
-        raise ArgumentError(f"robot: {model.name} has {what}, which the page cannot hold")
+        raise ArgumentError(f"robot: {model.name} has {what}, which the page cannot draw")
     said = words.of_robot(given) + words.of_yielding(given)
     size = float(machine.struct.size)
     if isinstance(machine, Machine):

@@ -53,7 +53,7 @@ def data(arm: SerialArm) -> dict[str, Any]:
 
 
 def _slider(unit: str, end: float, low: float, high: float) -> dict[str, Any]:
-    """As far as a slider goes, to its joint's limits at least, where both are known."""
+    """Range of a slider, to its joint's limits at least, where both are known."""
     if not np.isfinite([low, high]).all():
         return {"unit": unit, "range": [-end, end], "stroke": None}
     return {"unit": unit, "range": [min(-end, low), max(end, high)], "stroke": [low, high]}

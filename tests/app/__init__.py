@@ -11,12 +11,12 @@
 11. Two tabs, one fit a change: `test_flows.test_two_tabs_…`, `test_figures.test_one_change_…`,
     `test_guard.test_of_two_tabs_…`.
 12. Readers of screens, light and dark, 390 px, keyboard: `test_flows.test_screens_…`,
-    `test_flows.test_the_printers_way_…`; where one is: `test_staying`. The metrologist's way by
-    keyboard alone has no test but for its ticks.
+    `test_flows.test_the_printers_way_…`, `test_the_metrologists_way_…`; where one is:
+    `test_staying`.
 13. Live, with Kalico and Moonraker: `tests/live/test_moonraker.py` (`make test-kalico`); its
     screen, who starts it and what stops it: `test_measuring`.
 14. Without the extra: `test_figures.test_the_package_is_imported_…`.
-16. The printer's own probe: `test_flows.test_an_imported_printer_…`. G-code of a plan is
-    not written.
+16. The printer's own probe: `test_flows.test_an_imported_printer_…`; that the firmware takes its
+    G-code: `tests/controllers/test_kalico.py`.
 17. Scripts: `test_scripts`; types are mypy's.
 """

@@ -307,7 +307,11 @@ def test_the_metrologists_way_goes_by_keyboard_alone(tracked: Path, tmp_path: Pa
         fits(page, 1)
         before = (served.folder / "project.toml").read_bytes()
         for count, line in ((2, 19), (3, 54)):
-            focused(f"use tracker.csv line {line}", "Tab" if count == 2 else "Shift+Tab")
+            if count == 2:
+                first = page.locator("tr[id] input").first.get_attribute("aria-label")
+                assert first is not None
+                focused(first)
+            focused(f"use tracker.csv line {line}", "ArrowDown" if count == 2 else "ArrowUp")
             page.keyboard.press("Space")
             fits(page, count)
         assert page.locator("tr.odd").count() == 0
@@ -316,6 +320,29 @@ def test_the_metrologists_way_goes_by_keyboard_alone(tracked: Path, tmp_path: Pa
             press("Undo", "Shift+Tab")
             fits(page, count)
         assert (served.folder / "project.toml").read_bytes() == before
+
+
+def test_a_list_is_one_stop_of_the_keyboard_and_arrows_lead_through_it(tmp_path: Path) -> None:
+    with browser.served(tmp_path / "project") as served, browser.page_of(served) as page:
+        page.set_input_files("input[type=file]", PRINTER)
+        page.get_by_role("button", name="Calibrate with what it has stored").click()
+        fits(page, 1)
+        here = "document.activeElement.ariaLabel"
+        boxes = "[...document.querySelectorAll('tr[id] input')]"
+        names = page.evaluate(f"{boxes}.map(e => e.ariaLabel)")
+        shows = [name.replace("use", "show", 1) for name in names]
+        page.locator("tr[id] input").first.focus()
+        for key, label in (
+            ("ArrowDown", names[1]), ("ArrowRight", shows[1]),
+            ("ArrowRight", shows[1]), ("Control+End", shows[-1]),
+            ("ArrowLeft", names[-1]), ("ArrowDown", names[-1]), ("PageUp", names[-11]),
+        ):  # fmt: skip
+            page.keyboard.press(key)
+            assert page.evaluate(here) == label, key
+        page.keyboard.press("Tab")
+        assert not page.evaluate("!!document.activeElement.closest('tr[id]')")
+        page.keyboard.press("Shift+Tab")
+        assert page.evaluate(here) == names[-11]  # where one was
 
 
 def test_what_is_touched_is_large_enough_but_in_tables(tmp_path: Path) -> None:

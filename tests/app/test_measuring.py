@@ -131,7 +131,7 @@ def test_a_person_connects_starts_reads_and_calibrates(tmp_path: Path) -> None:
                 assert rows(folder) == row + 1
                 warned = panel.locator("p.warn").inner_text()
                 assert ("contradict" in warned) == (row == 16), (row, warned)
-            panel.get_by_text("measured as many as asked").wait_for()
+            panel.get_by_text("all the poses that were asked for are measured").wait_for()
             assert panel.locator("meter").is_visible()
             panel.get_by_role("button", name="Calibrate with these rows").click()
             page.locator("main[data-fits='1']").wait_for()
@@ -200,7 +200,7 @@ def test_its_panel_is_fit_for_readers_of_screens_and_for_telephones(
             panel.get_by_text(f"row {row + 1}, at").wait_for()
             box.fill("20.0")
             box.press("Enter")
-        panel.get_by_text("measured as many as asked").wait_for()
+        panel.get_by_text("all the poses that were asked for are measured").wait_for()
         page.evaluate(Path(axe).read_text(encoding="utf-8"))
         found = page.evaluate("axe.run(document, { resultTypes: ['violations'] })")
         assert not found["violations"], [

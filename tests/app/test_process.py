@@ -7,6 +7,7 @@ import json
 import subprocess
 import sys
 import time
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -59,17 +60,16 @@ def test_a_process_that_dies_is_said_and_replaced(tmp_path: Path) -> None:
 
 def stopped(served: browser.Served) -> float:
     """Stop work that runs; the seconds until it was answered."""
-    connection = http.client.HTTPConnection("127.0.0.1", served.port, timeout=30)
-    headers = {"x-pkmcal-token": served.token}
-    connection.request("POST", "/api/run/wait", b"{}", headers)
-    answer = connection.getresponse()
-    job = json.loads(answer.readline())["job"]
-    assert "progress" in json.loads(answer.readline())
-    begin = time.monotonic()
-    assert json.loads(ask(served, "POST", f"/api/cancel/{job}")[2]) == {"stopped": True}
-    *_, last = answer.read().splitlines()
-    took = time.monotonic() - begin
-    connection.close()
+    with closing(http.client.HTTPConnection("127.0.0.1", served.port, timeout=30)) as connection:
+        headers = {"x-pkmcal-token": served.token}
+        connection.request("POST", "/api/run/wait", b"{}", headers)
+        answer = connection.getresponse()
+        job = json.loads(answer.readline())["job"]
+        assert "progress" in json.loads(answer.readline())
+        begin = time.monotonic()
+        assert json.loads(ask(served, "POST", f"/api/cancel/{job}")[2]) == {"stopped": True}
+        *_, last = answer.read().splitlines()
+        took = time.monotonic() - begin
     assert json.loads(last)["error"] == {"message": "stopped", "stopped": True}
     return took
 
@@ -88,12 +88,11 @@ def test_stop_answers_at_once_and_the_next_work_goes_on(tmp_path: Path) -> None:
 def test_a_tab_that_is_closed_ends_its_work(tmp_path: Path) -> None:
     with browser.served(tmp_path / "project") as served:
         worker = health(served)["worker"]
-        connection = http.client.HTTPConnection("127.0.0.1", served.port, timeout=30)
-        connection.request("POST", "/api/run/wait", b"{}", {"x-pkmcal-token": served.token})
-        answer = connection.getresponse()
-        answer.readline(), answer.readline()
-        answer.close()
-        connection.close()
+        with closing(http.client.HTTPConnection("127.0.0.1", served.port, timeout=30)) as tab:
+            tab.request("POST", "/api/run/wait", b"{}", {"x-pkmcal-token": served.token})
+            answer = tab.getresponse()
+            answer.readline(), answer.readline()
+            answer.close()
         assert gone(worker)
 
 

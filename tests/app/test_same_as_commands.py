@@ -26,7 +26,8 @@ pytest.importorskip("uvicorn", reason="the extra app is not installed")
 from . import browser
 from .test_guard import ask, state
 
-PRINTER = Path(__file__).parents[2] / "examples" / "linear-delta" / "printer.cfg"
+EXAMPLES = Path(__file__).parents[2] / "examples"
+PRINTER = EXAMPLES / "linear-delta" / "printer.cfg"
 MACHINES = [name for name in pk.machines() if name != "rbt-6t03p-printed"]  # its home is singular
 HEX = ("hexapod", ("hexapod.csv",))
 ASKED = {
@@ -45,6 +46,7 @@ ASKED = {
     "a late log": Calibration(
         "hexapod", ("points.csv",), Reading(controller="log.csv", join="row+1")
     ),
+    "a Maslow": Calibration("maslow.toml", ("belts.csv",)),
     "outliers": Calibration(*HEX, drop_outliers=True, covariance="classical"),
 }
 
@@ -54,6 +56,11 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[browser.Served]
     folder = tmp_path_factory.mktemp("same")
     for name in MACHINES:
         measured(name, 40, seed=1).write(folder / f"{name}.csv")
+    maslow = EXAMPLES / "maslow"
+    printer = pk.import_printer(maslow / "maslow.yaml", log=maslow / "maslow.log")
+    (folder / "maslow.toml").write_text(printer.text)
+    assert printer.measurements is not None
+    printer.measurements.write(folder / "belts.csv")
     measured("hexapod", 12, seed=5).write(folder / "later.csv")
     text = (folder / "hexapod.csv").read_text().splitlines()
     first = next(i for i, line in enumerate(text) if not line.startswith("#"))

@@ -325,7 +325,7 @@ def test_rows_that_say_nothing_are_counted_and_change_nothing() -> None:
     values[[3, 4], :2] = np.nan  # heights alone
     some = pk.Measurements(q, values, sigma=0.02)
     found = pk.identify(robot, some, "offset*")
-    assert found.idle == 3 and "3 poses say nothing" in str(found)
+    assert found.idle == 3 and "3 poses add nothing" in str(found)
     assert found.rows.tolist() == [i for i in range(20) if i not in (2, 5, 11)]
     assert found.dof == 3 * 17 - 4 - 3
     read = [i for i in range(20) if i not in (2, 3, 4, 5, 11)]

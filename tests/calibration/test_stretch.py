@@ -237,7 +237,7 @@ def test_what_is_no_tension_is_refused(three: pk.Robot) -> None:
         three.tensioned([1.0, np.nan, 2.0])
     with pytest.raises(pk.ArgumentError, match="tension is of 2 rows, but 3 were asked for"):
         three.tensioned(np.ones((2, 3))).forward(np.full((3, 3), 1500.0))
-    with pytest.raises(pk.ArgumentError, match="under tension, which the page cannot hold"):
+    with pytest.raises(pk.ArgumentError, match="under tension, which the page cannot draw"):
         pk.show(three.tensioned([1.0, 1.0, 1.0]), "page.html")
 
 

@@ -287,6 +287,12 @@ def test_nothing_is_found_in_built_in_arms_nor_in_calibrated_ones() -> None:
         assert pk.check_geometry(arm.replace(errors).corrected()).ok
 
 
+def test_an_arm_of_which_all_axes_meet_has_no_length_of_another_unit() -> None:
+    """A positioner: its numbers are angles alone."""
+    turns = pk.SerialArm.from_dh(a=[0, 0], d=[0, 0], alpha=[np.pi / 2, 0], theta=np.zeros(2))
+    assert "unit" not in {each.kind for each in pk.check_geometry(turns).findings}
+
+
 def test_an_arm_in_metres_is_found() -> None:
     arm = pk.load("3r")
     home = arm.home

@@ -34,7 +34,7 @@ def test_carriages_stay_below_their_end_stops(tmp_path: Path) -> None:
     carriages = poses[:, 2:3] + np.sqrt(340.0**2 - far**2)
     below = (carriages <= 330.551363 + np.sqrt(340.0**2 - 170.0**2)).all(axis=1)
     assert 50 < below.sum() < 350
-    np.testing.assert_array_equal(robot.feasible(poses).ok, below)
+    np.testing.assert_array_equal(robot.feasible(poses).stroke.all(axis=1), below)
     np.testing.assert_array_equal((robot.inverse(poses) >= 0.0).all(axis=1), below)
 
 
@@ -101,18 +101,86 @@ def test_a_bed_of_unknown_size_is_asked_for(run: Any, refused: Any, tmp_path: Pa
     assert result.exit_code == 0, result.output
 
 
-def test_cranks_of_a_rotary_delta_stay_below_their_end_stops(tmp_path: Path) -> None:
-    (path := tmp_path / "rotary.cfg").write_text(
-        "[printer]\nkinematics: rotary_delta\nshoulder_radius: 180\nshoulder_height: 520\n"
-        "[delta_calibrate]\nradius: 60\n[stepper_a]\ngear_ratio: 107:16, 60:16\nmicrosteps: 16\n"
+def rotary(folder: Path, out: int, shoulders: int = 180) -> Path:
+    motors = [f"[stepper_{axis}]\ngear_ratio: 107:16, 60:16\nmicrosteps: 16\n" for axis in "bca"]
+    (path := folder / "rotary.cfg").write_text(
+        f"[printer]\nkinematics: rotary_delta\nshoulder_radius: {shoulders}\n"
+        f"shoulder_height: 520\n[delta_calibrate]\nradius: {out}\n{''.join(motors)}"
         "position_endstop: 252\nupper_arm_length: 170\nlower_arm_length: 400\n"
-        + "".join(f"[stepper_{axis}]\ngear_ratio: 107:16, 60:16\nmicrosteps: 16\n" for axis in "bc")
     )
-    robot = pk.import_printer(path).robot
+    return path
+
+
+@pytest.mark.parametrize(("out", "shoulders"), [(60, 180), (219, 180), (100, 90)])
+def test_the_firmware_of_cranks_takes_every_pose_of_the_workspace(
+    tmp_path: Path, out: int, shoulders: int
+) -> None:
+    """Of `check_move`: above the lowest elbow less its rod no farther out than below the top."""
+    robot = pk.import_printer(rotary(tmp_path, out, shoulders)).robot
+    box = robot.model.workspace
+    radius, top = box["radius"][1], box["z"][1]
+    # the elbow with the nozzle at the end stop, from the two lengths of its triangle
+    elbows = np.linspace(-np.pi / 2, np.pi / 2, 200_001)
+    across, down = shoulders + 170 * np.cos(elbows), 520 - 252 - 170 * np.sin(elbows)
+    elbow = elbows[np.argmin(np.abs(np.hypot(across, down) - 400))]
+    limit = 520 - 170 * np.sin(elbow) - 400
+    assert top <= 252 and (top <= limit + 0.1 or radius <= 252 - top + 1e-9)
+    assert radius == out or (radius < out and top >= 25.2)
+    assert robot.feasible(robot.home[None]).ok.all()
+
+
+def test_cranks_of_a_rotary_delta_stay_below_their_end_stops(tmp_path: Path) -> None:
+    robot = pk.import_printer(rotary(tmp_path, 60)).robot
     assert robot.model.workspace["radius"] == (0.0, 60.0)
     poses = np.zeros((3, 6))
     poses[:, 2] = [0.0, 251.0, 251.0]
     poses[2, 0] = 40.0  # away from the middle a crank would be above its end stop
     steps = robot.inverse(poses)
     assert (steps[:2] >= 0.0).all() and (steps[2] < 0.0).any()
-    assert robot.feasible(poses).ok.tolist() == [True, True, False]
+    assert robot.feasible(poses).stroke.all(axis=1).tolist() == [True, True, False]
+
+
+def taken(config: dict[str, float], poses: Any) -> Any:
+    """The rule of Klipper's `check_move` for a linear delta with three equal towers."""
+    radius, arm, top = config["delta_radius"], config["arm_length"], config["position_endstop"]
+    limit = top + np.sqrt(arm**2 - radius**2) - arm
+    over = np.clip(poses[:, 2] - limit, 0.0, arm)
+    narrow = radius - np.sqrt(arm**2 - (arm - over) ** 2)
+    most = np.minimum(config["print_radius"], narrow)
+    return (np.hypot(poses[:, 0], poses[:, 1]) <= most + 1e-9) & (poses[:, 2] <= top)
+
+
+@pytest.mark.parametrize("out", [95.0, 140.0, 170.0, 185.0])
+def test_the_firmware_takes_every_pose_of_the_workspace_and_not_much_above(
+    tmp_path: Path, out: float
+) -> None:
+    stated = f"delta_radius: 170\nprint_radius: {out}\n#"
+    box = klipper(tmp_path, "delta_radius: 170", stated).model.workspace
+    config = {"delta_radius": 170.0, "arm_length": 340.0, "position_endstop": 330.551363}
+    turn = np.linspace(0.0, 2 * np.pi, 30)
+    radius, top = min(box["radius"][1], box["x"][1]), box["z"][1]
+    rim = np.stack([radius * np.cos(turn), radius * np.sin(turn), 0 * turn + top], axis=1)
+    config["print_radius"] = out
+    assert taken(config, rim).all()
+    if out <= 170.0:  # as far as the towers: their carriages would be above the end stops
+        assert not taken(config, rim + np.array([0.0, 0.0, 0.01])).any()
+
+
+def test_a_bed_of_unknown_size_stays_within_the_radius_of_the_towers(tmp_path: Path) -> None:
+    box = klipper(tmp_path, "radius: 120", "").model.workspace
+    corner = np.array([[box["x"][1], box["y"][1], box["z"][1]]])
+    config = {"delta_radius": 170.0, "arm_length": 340.0, "position_endstop": 330.551363}
+    assert taken(config | {"print_radius": 170.0}, corner).all()
+
+
+def test_a_low_machine_gets_a_smaller_radius_before_it_gets_no_height(tmp_path: Path) -> None:
+    """End stops so low that the firmware narrows the radius that is stated from the bed on."""
+    text = PRINTER.read_text().replace("330.551363", "40").replace("radius: 120", "radius: 169")
+    (path := tmp_path / "low.cfg").write_text(text)
+    robot = pk.import_printer(path).robot
+    box = robot.model.workspace
+    assert 0.0 < box["radius"][1] < 169.0 and box["z"][1] >= 4.0
+    rim = np.array([[box["radius"][1], 0.0, box["z"][1]]])
+    config = {"delta_radius": 170.0, "arm_length": 340.0, "position_endstop": 40.0}
+    assert taken(config | {"print_radius": 170.0}, rim).all()
+    assert robot.feasible(robot.home[None]).ok.all()

@@ -94,8 +94,9 @@ def test_a_probe_of_klipper_that_is_not_read_is_said(
 ) -> None:
     printer = imported(tmp_path, KLIPPER + section, "klipper")
     assert probe_of(printer) is None
-    (note,) = printer.notes
+    note, heights = printer.notes
     assert re.search(why, note), note
+    assert "store heights" in heights  # it has none
 
 
 def test_a_second_probe_of_klipper_is_refused_without_a_height_too(tmp_path: Path) -> None:

@@ -52,7 +52,6 @@ def test_a_tracker_gets_a_certificate(tmp_path: Path, monkeypatch: pytest.Monkey
     pose = true.forward(q).pose
     seen = pose[:, :3] + rng.normal(0, 0.01, (40, 3)) + [1000.0, -300.0, 200.0]
     monkeypatch.chdir(tmp_path)
-    robot.save("machine.toml")
     legs = ["pose," + ",".join(f"q{i} [mm]" for i in range(1, 7))]
     legs += [f"{k}," + ",".join(map(repr, row)) for k, row in enumerate(q.tolist())]
     Path("legs.csv").write_text("\n".join(legs))

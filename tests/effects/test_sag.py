@@ -116,7 +116,7 @@ def test_the_verdict_suggests_sag_with_the_gain_that_it_has() -> None:
     m = measured(commands(40, 11), built(4), 12, stiff)
     rigid = pk.identify(ARM, m, **UNKNOWN)
     (said,) = [each for each in rigid.verdict.said if "gravity" in each.text or "sag" in each.text]
-    assert "poses left out: " in said.text and "--effects sag" in said.text
+    assert "error at poses left out" in said.text and "--effects sag" in said.text
     assert not [each for each in rigid.verdict.said if each.check == "causes"]  # said once
     found = pk.identify(ARM, m, effects="auto", **UNKNOWN)
     assert any("the arm sags" in text for text in found.verdict.remarks)
@@ -132,7 +132,7 @@ def test_sag_that_moves_the_numbers_makes_a_result_doubtful() -> None:
     rigid = pk.identify(ARM, measured(commands(40, 11), true, 12, SOFT, frame=NOWHERE))
     (said,) = [each for each in rigid.verdict.said if each.check == "sag-lacking"]
     assert said.level == "doubt" and rigid.verdict.state == "doubtful"
-    assert "of their ±" in said.text
+    assert "times their ±" in said.text
     place = [int(name[5]) * 6 - 6 + ERRORS.index(name.split(".")[1]) for name in rigid.free]
     truth, (low, high) = true.joint_errors.reshape(-1)[place], rigid.interval95.T
     known = np.isfinite(low)

@@ -267,7 +267,7 @@ def test_cables_and_what_winds_them_are_actuators(name: str, tmp_path: Path) -> 
 
 def test_a_heading_that_comes_once_more_is_left_out_and_said(tmp_path: Path) -> None:
     m = read(tmp_path, "q1 [mm],z [mm]\n1,2\nq1 [mm],z [mm]\n3,4\n")
-    assert len(m) == 2 and "once more in line 3, left out" in m.notes[0]
+    assert len(m) == 2 and "line 3 repeats the column names" in m.notes[0]
 
 
 def test_a_target_that_was_not_seen_may_be_dashes(tmp_path: Path) -> None:

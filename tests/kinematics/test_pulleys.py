@@ -288,5 +288,5 @@ def test_what_knows_no_pulleys_says_so(three: pk.Robot, tmp_path: Path) -> None:
 
 
 def test_pages_refuse_pulleys_and_reports_do_without(three: pk.Robot, tmp_path: Path) -> None:
-    with pytest.raises(pk.ArgumentError, match="has pulleys, which the page cannot hold"):
+    with pytest.raises(pk.ArgumentError, match="has pulleys, which the page cannot draw"):
         pk.show(three, tmp_path / "page.html")

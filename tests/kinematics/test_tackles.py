@@ -275,7 +275,7 @@ def test_points_may_share_named_numbers() -> None:
 def test_what_knows_no_tackles_says_so(three: pk.Robot, tmp_path: Path, export: Any) -> None:
     with pytest.raises(pk.ArgumentError, match=r"limb 1.* (over several points|a tackle)"):
         export(three, tmp_path / "out")
-    with pytest.raises(pk.ArgumentError, match="has tackles, which the page cannot hold"):
+    with pytest.raises(pk.ArgumentError, match="has tackles, which the page cannot draw"):
         pk.show(three, tmp_path / "page.html")
 
 

@@ -52,7 +52,7 @@ def test_a_machine_is_driven_and_a_person_types(folder: Path, server: Any) -> No
         done = measured(folder, f"{word}:{address}", "start\n5.1\nno\n5.2\n", "--count", "2")
         assert done.returncode == 0, done.stderr
         assert len(machine.lines) == 2
-        assert "measured as many as asked" in done.stdout
+        assert "all the poses that were asked for are measured" in done.stdout
         more = measured(folder, f"{word}:{address}", "start\n5.0\n", "--count", "4")
     assert more.returncode == 1  # nobody types the fourth
     assert "goes on behind 2 rows" in more.stderr and "stopped with 3 rows" in more.stderr

@@ -172,9 +172,10 @@ def test_answers_of_another_form_are_said_and_nothing_is_moved(
     assert len(seen) > 5 and moved == []
 
 
-def test_an_answer_that_does_not_end_is_not_waited_for() -> None:
+@pytest.mark.parametrize("code", [200, 500])
+def test_an_answer_that_does_not_end_is_not_waited_for(code: int) -> None:
     def drips(handler: Any) -> None:
-        handler.send_response(200)
+        handler.send_response(code)
         handler.send_header("Content-Length", "1000")
         handler.end_headers()
         with suppress(OSError):

@@ -22,12 +22,15 @@ MM = ("mm",)
 
 @pytest.fixture
 def terminal() -> Iterator[tuple[int, str]]:
-    """The gauge's end of a line, and the name of the port."""
+    """The gauge's end of a line, and the name of the port; it ends when all is sent."""
     pytest.importorskip("serial")
     tty = pytest.importorskip("tty")
     master, slave = os.openpty()
     tty.setraw(slave)
     yield master, os.ttyname(slave)
+    for thread in threading.enumerate():
+        if thread.name == f"gauge {master}":
+            thread.join()
     for end in (master, slave):
         os.close(end)
 
@@ -38,7 +41,7 @@ def later(master: int, *lines: bytes, pause: float = 0.05) -> threading.Thread:
             time.sleep(pause)
             os.write(master, line)
 
-    thread = threading.Thread(target=send, daemon=True)
+    thread = threading.Thread(target=send, daemon=True, name=f"gauge {master}")
     thread.start()
     return thread
 

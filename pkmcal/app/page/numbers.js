@@ -1,5 +1,6 @@
 // The numbers of a machine: found or held, each with a box that refits.
 import { app, field, made, attempt } from './frame.js'
+import { grid } from './grid.js'
 
 export function numbers(parent, found, before, refit) {
   const wide = made('div', parent, { className: 'wide', tabindex: 0, role: 'region', 'aria-label': 'numbers' })
@@ -30,6 +31,7 @@ export function numbers(parent, found, before, refit) {
     box(made('td', line), name, false, fit => { fit.fix = fix().filter(one => one !== name); if (!fit.fix.length) delete fit.fix })
     for (const text of [name, said, '', '', '', '']) made('td', line, { text })
   }
+  grid(table)
   const more = made('select', null, { onchange: () => more.value && attempt(() => refit(fit => { fit.free = [...new Set([...free(), more.value])] })) })
   made('option', more, { value: '', text: '…' })
   for (const name of found.others) made('option', more, { value: name, text: name })

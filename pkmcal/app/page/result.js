@@ -1,5 +1,6 @@
 // How good it is: the verdict first, then rows, numbers and the picture, each of which refits.
 import { again, app, attempt, button, change, choice, made, work } from './frame.js'
+import { grid } from './grid.js'
 import { numbers } from './numbers.js'
 import { draw, selected } from './picture.js'
 
@@ -124,6 +125,7 @@ function rows(parent, found, list, refit, name) {
     line.onclick = event => { if (event.target !== show) name(each.key, 'list') }
     for (const text of [...each.off, each.said]) made('td', line, { text })
   }
+  grid(table)
   if (moved) button(parent, 'sort, worst first', () => { list.order = []; again(parent, () => rows(parent, found, list, refit, name)) })
   if (shown.length < sorted.length) button(parent, `show all ${sorted.length} rows`, () => { list.all = true; again(parent, () => rows(parent, found, list, refit, name)) })
 }
