@@ -76,7 +76,8 @@ class Remedy:
             value = {**before, **dict.fromkeys(_listed(value), "unknown")}
         elif self.argument in _SEVERAL and before is not None:
             kept = [each for each in _listed(before) if not self._replaces(each)]
-            several = tuple(dict.fromkeys((*kept, *_listed(value))))
+            new = [each for each in _listed(value) if each not in kept]
+            several = (*kept, *new)
             value = several if len(several) > 1 else value
         return {**arguments, self.argument: value}
 

@@ -176,7 +176,8 @@ def test_how_far_off_points_must_be_to_contradict_few_equations(spare: int) -> N
     limit = told.holdout_test.least_ratio
     assert f"contradict the fit only from {limit:.2g} times what is" in str(told.verdict.reasons)
     first, second = told.holdout_test.freedom
-    assert f_distribution.sf(limit**2, first, second) == pytest.approx(0.01, rel=1e-6)
+    # squares of points that share errors are more skew than those of F, whose tail is then lower
+    assert 0.0045 < f_distribution.sf(limit**2, first, second) < 0.005 * (1.0 + 1e-6)
 
 
 def test_five_spare_equations_are_five_whatever_the_last_bit_says() -> None:

@@ -116,7 +116,7 @@ def test_sag_helps_at_poses_left_out(arm: pk.SerialArm, log: Measurements) -> No
     assert finding.comparison.after <= 0.195
     assert finding.comparison.t > 2.0 and len(finding.comparison.numbers) == 6
     (said,) = [each.text for each in found.verdict.said if each.check == "sag-lacking"]
-    assert "0.249 → 0.192 mm" in said and "--effects sag" in said
+    assert "from 0.249 to 0.192 mm" in said and "--effects sag" in said
     assert not [each for each in found.verdict.said if each.check == "causes"]
 
 
