@@ -45,6 +45,7 @@ export async function result(main) {
 
   const show = async () => {
     const found = await work('fit', 'calibrating')
+    if (!main.isConnected) return // another screen, or this one begun anew, is shown by now
     for (const row of found.rows) Object.assign(row, { use: row.use ?? '', said: row.said ?? '', drop: row.drop === undefined ? row.key : row.drop })
     app.found = found
     again(verdict, () => say(verdict, found, refit))
