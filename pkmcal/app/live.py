@@ -9,18 +9,17 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
-import os
 import secrets
-import sys
 from collections.abc import AsyncIterator
-from pathlib import Path
 from typing import Any
 
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response, StreamingResponse
 from starlette.routing import Route
 
+from pkmcal.app.body import TooLargeError, body
 from pkmcal.app.folder import Folder
+from pkmcal.app.launched import launched
 from pkmcal.exceptions import Error
 
 _MOST = 20_000  # bytes of a request
@@ -121,7 +120,11 @@ class Live:
         following: asyncio.Future[bytes] | None = None
         try:
             yield _line({"run": name})
-            self._process = process = await _launched(self._folder.path)
+            self._process = process = await launched(
+                "pkmcal.app.measurer", self._folder.path,
+                stderr=asyncio.subprocess.DEVNULL, limit=_LONGEST,
+                start_new_session=True,  # Ctrl-C reaches it by the server alone, in order
+            )  # fmt: skip
             assert process.stdin is not None and process.stdout is not None
             process.stdin.write(json.dumps(first).encode() + b"\n")
             last = False
@@ -149,27 +152,11 @@ class Live:
             self._name = ""
 
 
-async def _launched(folder: Path) -> asyncio.subprocess.Process:
-    threads = {"OPENBLAS_NUM_THREADS": "1", **os.environ}  # as the command line has it
-    return await asyncio.create_subprocess_exec(
-        sys.executable, "-m", "pkmcal.app.measurer",
-        stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE,
-        stderr=asyncio.subprocess.DEVNULL, cwd=folder, limit=_LONGEST,
-        env={**threads, "PYTHONUTF8": "1"},
-        start_new_session=True,  # Ctrl-C in the terminal reaches it by the server alone, in order
-    )  # fmt: skip
-
-
 async def _asked(request: Request) -> Any:
     """The JSON of a request; None where it has none, or too much."""
-    found = b""
-    async for chunk in request.stream():
-        found += chunk
-        if len(found) > _MOST:
-            return None
     try:
-        return json.loads(found or b"{}")
-    except (ValueError, RecursionError):
+        return json.loads(await body(request, _MOST) or b"{}")
+    except (ValueError, RecursionError, TooLargeError):
         return None
 
 

@@ -8,10 +8,11 @@ import itertools
 import json
 import os
 import signal
-import sys
 from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
+
+from pkmcal.app.launched import launched
 
 _LONGEST_LINE = 2**28  # bytes of one message
 _FAILED = (
@@ -21,11 +22,6 @@ _FAILED = (
 Message = dict[str, Any]
 Process = asyncio.subprocess.Process
 _REST = 0.5  # s without a request, after which the next process is started
-# The process works in the user's folder, of which no file may be taken for a module: Python looks
-# there first (-P, which says the same, is not known to Python 3.10).
-_WORKER = (
-    "import sys; sys.path[:] = filter(None, sys.path);from pkmcal.app.worker import main; main()"
-)
 
 
 class Worker:
@@ -72,13 +68,10 @@ class Worker:
 
     async def _launched(self) -> Process:
         log = os.devnull if self._log is None else self._log
-        threads = {"OPENBLAS_NUM_THREADS": "1", **os.environ}  # as the command line has it
         with open(log, "ab") as errors:
-            return await asyncio.create_subprocess_exec(
-                sys.executable, "-c", _WORKER,
-                stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE, stderr=errors,
-                cwd=self._folder, limit=_LONGEST_LINE, env={**threads, "PYTHONUTF8": "1"},
-            )  # fmt: skip
+            return await launched(
+                "pkmcal.app.worker", self._folder, stderr=errors, limit=_LONGEST_LINE
+            )
 
     def _prepare(self) -> None:
         """Start a process that waits, once nothing was asked for a moment."""

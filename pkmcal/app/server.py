@@ -22,6 +22,7 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.responses import FileResponse, JSONResponse, Response, StreamingResponse
 from starlette.routing import Route
 
+from pkmcal.app.body import TooLargeError, body
 from pkmcal.app.commands import commands
 from pkmcal.app.folder import MOST_FILE, MOST_FOLDER, UPLOAD, Folder
 from pkmcal.app.guard import Application, Guard
@@ -120,9 +121,9 @@ class Server:
     async def change(self, request: Request) -> Response:
         """Take a whole new state of the version that it was made of."""
         try:
-            asked = json.loads(await _body(request))
+            asked = json.loads(await body(request, _MOST_STATE))
             table, version = asked["state"], asked["version"]
-        except _TooLarge:
+        except TooLargeError:
             return _refused(413, "too large")
         except (ValueError, RecursionError, TypeError, KeyError):
             return _refused(400, "no state in this request")
@@ -137,8 +138,8 @@ class Server:
     async def undo(self, request: Request) -> Response:
         """Go one state back."""
         try:
-            version = json.loads(await _body(request))["version"]
-        except (ValueError, RecursionError, TypeError, KeyError, _TooLarge):
+            version = json.loads(await body(request, _MOST_STATE))["version"]
+        except (ValueError, RecursionError, TypeError, KeyError, TooLargeError):
             return _refused(400, "no version in this request")
         try:
             return self._changed(request, self._folder.undo(version))
@@ -190,8 +191,8 @@ class Server:
         if operation not in self._operations:
             return _refused(404, "no such work")
         try:
-            asked = json.loads(await _body(request) or b"{}")
-        except (ValueError, RecursionError, _TooLarge):
+            asked = json.loads(await body(request, _MOST_STATE) or b"{}")
+        except (ValueError, RecursionError, TooLargeError):
             return _refused(400, "no request")
         if not isinstance(asked, dict):
             return _refused(400, "no request")
@@ -301,24 +302,11 @@ def guarded(
     return Guard(server.application(), port, token), server.end
 
 
-class _TooLarge(Exception):
-    """A request has more bytes than it may have."""
-
-
 async def _ended(task: asyncio.Future[Any]) -> None:
     """End a task, and wait until it has ended."""
     task.cancel()
     with contextlib.suppress(asyncio.CancelledError):
         await task
-
-
-async def _body(request: Request) -> bytes:
-    found = b""
-    async for chunk in request.stream():
-        found += chunk
-        if len(found) > _MOST_STATE:
-            raise _TooLarge
-    return found
 
 
 def _static(path: str, name: str) -> Route:

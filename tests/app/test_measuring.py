@@ -289,6 +289,18 @@ def test_whoever_goes_stops_the_machine_and_no_row_is_lost(tmp_path: Path, pulle
         run.close()
 
 
+def test_no_file_of_the_folder_is_run_by_what_measures(tmp_path: Path) -> None:
+    folder, ran = project(tmp_path / "project"), tmp_path / "ran"
+    (folder / "pkmcal").mkdir()
+    for name in ("json", "queue", "numpy", "serial", "pkmcal/__init__"):
+        (folder / f"{name}.py").write_text(f"open({str(ran)!r}, 'w').close()\n")
+    with duet() as (address, _), browser.served(folder) as served:
+        run = Stream(served, f"reprap:{address}")
+        run.next("ready")
+        run.close()
+    assert not ran.exists()
+
+
 def test_ctrl_c_at_the_server_stops_the_machine(tmp_path: Path) -> None:
     folder = project(tmp_path / "project")
     with duet() as (address, machine), browser.served(folder) as served:
