@@ -156,11 +156,10 @@ def fit_of(found: Solution) -> LinearFit:
     system = sure.equations.system
     if system is None or sure.equations.blocks.unstated.all():
         return _with_sets_alike(sure)
-    beyond = sure.prior_residual if sure.allowed is None else sure.allowed[1]
     use = np.zeros(len(sure.fit.residual), dtype=bool)
     use[equations_of_visits(found, visits_of(found))[0]] = True
     evaluation = found.fit.estimate.evaluation
-    return of_own_noises(sure.tested, beyond, system, evaluation, sure.factors, use)
+    return of_own_noises(*sure.tested_with_prior, system, evaluation, sure.factors, use)
 
 
 def _with_sets_alike(sure: Uncertainty) -> LinearFit:
@@ -169,7 +168,7 @@ def _with_sets_alike(sure: Uncertainty) -> LinearFit:
     A set of another machine may have got a noise that is what common numbers miss of it: then it
     would say too little of numbers of its own.
     """
-    fit, equations = sure.of_own_deviations, sure.equations
+    (fit, beyond), equations = sure.of_own_deviations, sure.equations
     if sure.mixed or len(equations.table.sets) == 1 or equations.whole is not None:
         return fit
     group = equations.whitening.of_equations(equations.whitening.groups)
@@ -179,7 +178,7 @@ def _with_sets_alike(sure: Uncertainty) -> LinearFit:
     common = (np.bincount(alike, own) / np.bincount(alike))[alike]
     if np.allclose(own, common):
         return fit
-    return reweighted(fit, np.exp(common - own), sure.prior_residual)
+    return reweighted(fit, np.exp(common - own), beyond)[0]
 
 
 def _in_no_order(

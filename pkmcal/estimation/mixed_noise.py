@@ -23,7 +23,7 @@ import numpy as np
 from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.pose_system import PoseSystem
-from pkmcal.statistics.linear_fit import LinearFit
+from pkmcal.statistics.linear_fit import LinearFit, solved_again
 
 _ROUNDS, _SETTLED, _STEP = 40, 1e-3, 1.5  # of the logarithms of the variances
 _LEAST, _MOST = 1e-8, 1e8  # of a variance, in units of the stated one
@@ -97,9 +97,7 @@ def _solved(
         residual[alike.left] = (half @ residual[alike.left][:, :, None])[:, :, 0]
     normal = design.T @ design + fit.prior.T @ fit.prior
     back = np.linalg.inv(np.linalg.cholesky(normal)).T
-    design, prior = design @ back, fit.prior @ back
-    residual = residual - design @ (design.T @ residual + prior.T @ prior_residual)
-    return replace(fit, design=design, residual=residual, prior=prior, back=fit.back @ back)
+    return solved_again(fit, design, residual, prior_residual, back)[0]
 
 
 def _variances(fit: LinearFit, prior_residual: FloatArray, poses: Sequence[_Alike]) -> FloatArray:
@@ -124,9 +122,8 @@ def _variances(fit: LinearFit, prior_residual: FloatArray, poses: Sequence[_Alik
         )
         own = np.ix_(present, present)
         step = np.zeros(groups)
-        step[present] = np.linalg.lstsq(information[own], (squares - freedom)[present], rcond=1e-9)[
-            0
-        ]
+        slope = (squares - freedom)[present]
+        step[present] = np.linalg.lstsq(information[own], slope, rcond=_ROUNDING)[0]
         after = np.clip(theta * np.exp(np.clip(step, -_STEP, _STEP)), _LEAST, _MOST)
         settled = np.abs(np.log(after / theta)).max() < _SETTLED
         theta = after

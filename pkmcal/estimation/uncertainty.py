@@ -20,6 +20,7 @@ from pkmcal.measurements.measurements import Measurements
 from pkmcal.statistics.covariance import Covariance, CovarianceRule, covariance
 from pkmcal.statistics.linear_fit import (
     LinearFit,
+    Solved,
     in_unit_basis,
     met_exactly,
     numbered,
@@ -96,7 +97,7 @@ class Uncertainty:
     information: FloatArray
     considered: FloatArray | None = None
     noise_share: float = 1.0
-    allowed: tuple[LinearFit, FloatArray] | None = None
+    allowed: Solved | None = None
 
     @property
     def known(self) -> bool:
@@ -140,19 +141,23 @@ class Uncertainty:
     @property
     def tested(self) -> LinearFit:
         """The fit for tests of the model: without what considered numbers explain of residuals."""
-        return self.fit if self.allowed is None else self.allowed[0]
+        return self.tested_with_prior[0]
+
+    @property
+    def tested_with_prior(self) -> Solved:
+        """The tested fit, and residuals of its prior's rows."""
+        return (self.fit, self.prior_residual) if self.allowed is None else self.allowed
 
     @cached_property
-    def of_own_deviations(self) -> LinearFit:
-        """The tested fit with each component in units of its own deviation.
+    def of_own_deviations(self) -> Solved:
+        """The tested fit with each component in units of its own deviation, as `Solved`.
 
         Where a stated sigma is right for some of the components and too small for others, tests of
         the linear model take what these miss for what they look for.
         """
         if self.mixed or self.equations.blocks.unstated.all():
-            return self.tested  # where none is stated, they have their own already
-        beyond = self.prior_residual if self.allowed is None else self.allowed[1]
-        return _of_own_deviations(self.tested, self.labels, self._place, beyond)
+            return self.tested_with_prior  # where none is stated, they have their own already
+        return _of_own_deviations(*self.tested_with_prior, self.labels, self._place)
 
     def _beside(self, contrasts: FloatArray) -> FloatArray | float:
         """Return the covariance of contrasts (q, p) by offsets and numbers not fitted."""
@@ -386,7 +391,7 @@ def uncertainty(
     beyond = prior_residual(estimator, estimate)
     refuted = not estimator.unstated.any() and np.isfinite(found.scale_freedom)
     refuted = refuted and rule == "auto" and not equations.machines.unknowns
-    if refuted and _of_own_deviations(fit, named, component_of(equations), beyond) is not fit:
+    if refuted and _of_own_deviations(fit, beyond, named, component_of(equations))[0] is not fit:
         found = replace(found, rule="cluster")  # sigma is wrong of some components alone
     coarse = coarse_readings(equations, named, fit, state.noise, found)
     widening = max((each.widening for each in coarse), default=1.0)
@@ -407,17 +412,17 @@ def uncertainty(
 
 
 def _of_own_deviations(
-    fit: LinearFit, named: Labels, place: IntArray, beyond: FloatArray
-) -> LinearFit:
+    fit: LinearFit, beyond: FloatArray, named: Labels, place: IntArray
+) -> Solved:
     """Return the fit with other weights of components, or itself if those that it has will do.
 
     `beyond` are the residuals of the prior's rows.
     """
     if not named.component.any():
-        return fit  # a single component
+        return fit, beyond  # a single component
     found = told_apart(fit, component_classes(named, place), beyond)
     if found is None:
-        return fit
+        return fit, beyond
     return reweighted(fit, np.sqrt(found.variances)[found.classes], beyond)
 
 

@@ -94,6 +94,9 @@ class LinearFit:
         return kept
 
 
+Solved = tuple[LinearFit, FloatArray]  # a fit, and residuals (q,) of its prior's rows
+
+
 def met_exactly(residual: FloatArray, component: IntArray) -> BoolArray:
     """Mark equations (M,) of components (M,) whose residuals are nothing but rounding errors.
 
@@ -109,21 +112,38 @@ def met_exactly(residual: FloatArray, component: IntArray) -> BoolArray:
     return met
 
 
-def reweighted(fit: LinearFit, deviations: FloatArray, prior_residual: FloatArray) -> LinearFit:
+def reweighted(fit: LinearFit, deviations: FloatArray, prior_residual: FloatArray) -> Solved:
     """Solve a fit again with other deviations (M,) of its equations, in units of the present ones.
 
     `prior_residual` (q,) are the residuals of the prior's rows.
     """
     design, residual = fit.design / deviations[:, None], fit.residual / deviations
     back = unit_basis(design, fit.prior, np.eye(design.shape[1]))
+    return solved_again(fit, design, residual, prior_residual, back)
+
+
+def solved_again(
+    fit: LinearFit,
+    design: FloatArray,
+    residual: FloatArray,
+    prior_residual: FloatArray,
+    back: FloatArray,
+) -> Solved:
+    """Solve a fit again, whose design (M, p) and residuals (M,) have other weights.
+
+    `back` (p, p) are the combinations of its basis in which the normal matrix is the identity then.
+    """
     design, prior = design @ back, fit.prior @ back
-    residual = residual - design @ (design.T @ residual + prior.T @ prior_residual)
-    return replace(fit, design=design, residual=residual, prior=prior, back=fit.back @ back)
+    step = design.T @ residual + prior.T @ prior_residual
+    found = replace(
+        fit, design=design, residual=residual - design @ step, prior=prior, back=fit.back @ back
+    )
+    return found, prior_residual - prior @ step
 
 
 def allowing(
     fit: LinearFit, columns: FloatArray, deviation: float, prior_residual: FloatArray
-) -> tuple[LinearFit, FloatArray]:
+) -> Solved:
     """Solve a fit again with further numbers, each of a prior with deviation 1 about 0.
 
     Parameters

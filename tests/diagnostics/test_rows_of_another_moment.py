@@ -62,8 +62,8 @@ def measured(q: np.ndarray, read: np.ndarray, file: str = "") -> pk.Measurements
     return pk.Measurements(q, read, "pose" if read.shape[1] == 6 else "position", file=file)
 
 
-def doubts(robot: Any, *data: pk.Measurements) -> dict[str, Any]:
-    found = pk.identify(robot, data, holdout=0.25)
+def doubts(robot: Any, *data: pk.Measurements, **options: Any) -> dict[str, Any]:
+    found = pk.identify(robot, data, holdout=0.25, **options)
     return {each.check: each for each in found.verdict.said if each.level == "doubt"}
 
 
@@ -168,6 +168,38 @@ def test_files_of_unlike_noise_are_not_those_of_two_machines() -> None:
         read[:30] += 10.0 * (noisy(read[:30], rng) - read[:30])
         halves = [measured(q[:30], read[:30], "one.csv"), measured(q[30:], read[30:], "other.csv")]
         assert "two-machines" not in doubts(robot, *halves)
+
+
+def test_numbers_that_are_considered_do_not_hide_a_file_of_another_machine() -> None:
+    """Nor make one of what they explain; the files are of unlike noise."""
+    robot = pk.load("hexapod")
+    q = robot.inverse(pk.sample_poses(robot, COUNT, seed=1, share=0.5))
+    sizes = {"offset*": 0.1, "base?.x": 0.02}
+    options = {"free": "offset*", "uncertainty": {"consider": {"base?.x": sizes["base?.x"]}}}
+    said = []
+    for other in (False, True):
+        rng = np.random.default_rng(0)
+        wrong = {name: size for kind, size in sizes.items() for name in robot.geometry.match(kind)}
+        true = [
+            _poses(
+                robot.replace(
+                    {
+                        name: robot.geometry[name] + size * rng.normal()
+                        for name, size in wrong.items()
+                    }
+                ),
+                6,
+            )
+            for _ in range(2)
+        ]
+        exact = true[other](q[30:])
+        noisier = exact + 3.0 * (noisy(exact, rng) - exact)
+        halves = [
+            measured(q[:30], noisy(true[0](q[:30]), rng), "one.csv"),
+            measured(q[30:], noisier, "other.csv"),
+        ]
+        said.append("two-machines" in doubts(robot, *halves, **options))
+    assert said == [False, True]
 
 
 def sides(q: np.ndarray, rng: np.random.Generator, lean: float) -> np.ndarray:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pkmcal.statistics.linear_fit import column_basis, triangle
+from pkmcal.statistics.linear_fit import column_basis, linear_fit, reweighted, triangle
 
 
 @pytest.mark.parametrize("columns", [3, 64, 65, 90, 140])
@@ -37,3 +37,25 @@ def test_a_known_factor_gives_the_basis_that_the_matrix_gives() -> None:
     assert basis.shape == (300, 5)
     np.testing.assert_allclose(basis.T @ basis, np.eye(5), atol=1e-12)
     np.testing.assert_allclose(basis @ (basis.T @ matrix), matrix, atol=1e-12)
+
+
+def test_a_fit_that_is_weighted_twice_is_that_of_both_weights_at_once() -> None:
+    """Against least squares of all rows, those of the prior among them."""
+    rng = np.random.default_rng(2)
+    design, values = rng.normal(size=(30, 3)), rng.normal(size=30)
+    prior, known = 2.0 * np.eye(3)[:2], rng.normal(size=2)
+    first, second = rng.uniform(0.2, 5.0, (2, 30))
+
+    def left(deviations: np.ndarray) -> np.ndarray:
+        rows = np.vstack([design / deviations[:, None], prior])
+        wanted = np.concatenate([values / deviations, known])
+        return wanted - rows @ np.linalg.lstsq(rows, wanted, rcond=None)[0]
+
+    plain, each = left(np.ones(30)), np.arange(30)
+    fit = linear_fit(design, plain[:30], prior, np.eye(3), each, each)
+    once = reweighted(fit, first, plain[30:])
+    twice = reweighted(once[0], second, once[1])
+    for (found, beyond), deviations in ((once, first), (twice, first * second)):
+        np.testing.assert_allclose(
+            np.concatenate([found.residual, beyond]), left(deviations), atol=1e-12
+        )
