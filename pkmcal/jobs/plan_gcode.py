@@ -11,22 +11,21 @@ from itertools import pairwise
 
 import numpy as np
 
-from pkmcal.arguments import word
-from pkmcal.arms.arm import SerialArm
+from pkmcal.arguments import number, word
 from pkmcal.arrays import FloatArray
 from pkmcal.core.library import POSE
 from pkmcal.exceptions import ArgumentError
 from pkmcal.jobs.plan import GCODE, Planning
 from pkmcal.kinematics.robot import Robot
+from pkmcal.kinematics.straight_way import straight_way
+from pkmcal.live.measuring_run import Rules
 from pkmcal.planning.plan_poses import Plan
 
 OPTION = "--gcode"
 PROBE = "probe"  # kind of a plan for a printer's own probe
 _LETTERS = dict(zip(POSE, "XYZABC", strict=True))
-_FEED = 1500.0  # mm/min, also of `pkmcal measure`
 _OVER_BED = 5.0  # mm to which it rises between poses of a probe, where nothing else is stated
 _DECIMALS = 5  # of mm and deg
-_STEP, _LEAST = 5.0, 8  # mm between places of a way that are looked at, and how many at least
 
 
 @dataclass(frozen=True)
@@ -103,11 +102,11 @@ def program(job: Planning, made: Plan, head: str) -> str:
     Raises
     ------
     ValueError
-        Another machine than one that this firmware moves, a pause that is none, or a way that
-        leaves the limits.
+        Another machine than one that this firmware moves, a pause or a height that is none, or a
+        way that leaves the limits.
     """
     firmware, robot = firmware_of(job), made.robot
-    if isinstance(robot, SerialArm) or not isinstance(robot, Robot):
+    if not isinstance(robot, Robot):
         raise ArgumentError(f"{OPTION}: of parallel machines; {robot.name} is an arm")
     axes = robot.moved
     turned = [axis for axis in axes if axis not in "xyz"]
@@ -118,6 +117,8 @@ def program(job: Planning, made: Plan, head: str) -> str:
         )
     if not (np.isfinite(job.dwell) and 0.0 <= job.dwell <= 3600.0):
         raise ArgumentError(f"--dwell must be from 0 to 3600 s, found {job.dwell:g}")
+    if job.safe_height is not None:
+        number("--safe-height", job.safe_height)
     probed = job.kind == PROBE
     height = _OVER_BED if probed and job.safe_height is None else job.safe_height
     lines = [
@@ -181,8 +182,7 @@ def _over(start: FloatArray, end: FloatArray, height: float | None) -> list[Floa
 
 def _outside(robot: Robot, start: FloatArray, end: FloatArray) -> FloatArray | None:
     """Return the first pose of a straight way that is outside of the limits."""
-    points = max(_LEAST, int(np.abs(end - start)[:3].max() / _STEP))
-    way: FloatArray = start + np.linspace(0.0, 1.0, points + 1)[1:, None] * (end - start)
+    way = straight_way(start, end)
     inside = robot.feasible(way).ok
     return None if inside.all() else way[np.argmin(inside)]
 
@@ -192,7 +192,7 @@ def _move(robot: Robot, pose: FloatArray) -> str:
     for axis in robot.moved:
         value = pose[POSE.index(axis)]
         words.append(_LETTERS[axis] + _number(value if axis in "xyz" else np.degrees(value)))
-    return " ".join(["G1", *words, f"F{_FEED:g}"])
+    return " ".join(["G1", *words, f"F{Rules.feed:g}"])
 
 
 def _number(value: float) -> str:

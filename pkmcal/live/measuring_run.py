@@ -18,14 +18,13 @@ import numpy as np
 from pkmcal.arrays import FloatArray
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.robot import Robot
+from pkmcal.kinematics.straight_way import straight_way
 from pkmcal.live.course import Course
 from pkmcal.live.device import FARTHEST, DeviceError, Instrument, Machine
 from pkmcal.live.row_log import RowLog
 
 _THERE, _TURNED = 0.02, 1e-3  # mm and rad by which a controller may be off the pose asked for
 _SAME = 0.5  # mm by which its drives may be off its place by the robot file
-_STEP = 5.0  # mm between points of a way that are looked at
-_LEAST, _MOST = 8, 4000  # how many at least; a way with more leaves the limits
 _DONE = 0.1  # mm, and 1e-3 rad: a row so near to a candidate is of it
 
 
@@ -192,9 +191,7 @@ class MeasuringRun:
 
     def _require_within(self, start: FloatArray, end: FloatArray) -> None:
         """Refuse a move that leaves strokes, cones or the box; where it began may be outside."""
-        points = int(np.clip(np.abs(end - start)[:3].max() / _STEP, _LEAST, _MOST))
-        share = np.linspace(0.0, 1.0, points + 1)[1:, None]
-        way = start + share * (end - start)
+        way = straight_way(start, end)
         inside = self._robot.feasible(way).ok
         began = bool(self._robot.feasible(start).ok)
         first = int(np.argmax(inside)) if not began else 0  # it may come in from outside

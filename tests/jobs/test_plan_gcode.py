@@ -114,6 +114,9 @@ def test_every_way_stays_within_the_limits(
         ("linear-delta", {"gcode": "klipper", "dwell": float("inf")}, "--dwell must be"),
         ("linear-delta", {"gcode": "linuxcnc", "kind": "probe"}, "no probe"),
         ("linear-delta", {"gcode": "klipper", "safe_height": 5000.0}, "leaves the limits"),
+        ("linear-delta", {"gcode": "klipper", "safe_height": 1e300}, "leaves the limits"),
+        ("linear-delta", {"gcode": "klipper", "safe_height": float("nan")}, "--safe-height must"),
+        ("linear-delta", {"gcode": "klipper", "safe_height": float("inf")}, "--safe-height must"),
     ],
 )  # fmt: skip
 def test_what_a_program_cannot_say_is_refused(
