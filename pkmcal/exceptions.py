@@ -42,8 +42,9 @@ class CalibrationWarning(_Shown, UserWarning):
     """A warning of `identify` about a fit that succeeded."""
 
 
-def of_system(error: OSError) -> str:
-    """Return the words of an error of the system, the file that it is about first."""
-    if type(error).__str__ is OSError.__str__ and error.strerror and error.filename:
-        return f"{error.filename}: {error.strerror}"
+def words_of(error: BaseException) -> str:
+    """Return the words of an error; of one of the system the file that it is about first."""
+    if isinstance(error, OSError) and type(error).__str__ is OSError.__str__:
+        if error.strerror and error.filename:
+            return f"{error.filename}: {error.strerror}"
     return str(error)

@@ -20,7 +20,7 @@ from starlette.routing import Route
 from pkmcal.app.body import TooLargeError, body
 from pkmcal.app.folder import Folder
 from pkmcal.app.launched import launched
-from pkmcal.exceptions import Error
+from pkmcal.exceptions import Error, words_of
 
 _MOST = 20_000  # bytes of a request
 _SILENT = 1.0  # s, after which a line that says nothing finds out whether somebody still listens
@@ -63,7 +63,7 @@ class Live:
             self._folder.follow()
             self._folder.refuse_links(self._folder.project)
         except (Error, OSError) as error:
-            return _refused(400, str(error))
+            return _refused(400, words_of(error))
         first = {"state": self._folder.project.table(), "given": asked}
         return StreamingResponse(self._lines(first), media_type="application/x-ndjson")
 

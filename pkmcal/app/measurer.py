@@ -29,7 +29,6 @@ from pkmcal.jobs.project import Project
 from pkmcal.jobs.stated import command, quoted
 from pkmcal.live import course_words
 from pkmcal.live.course import Course
-from pkmcal.live.device import DeviceError
 from pkmcal.live.measuring_run import Rules, Stopped, pose_words
 
 Table = dict[str, Any]
@@ -95,7 +94,7 @@ class Measurer:
         words += ["--instrument", instrument] if instrument else []
         for name, option in _RULES.items():
             if getattr(rules, name) != getattr(Rules(), name):
-                words += [option, f"{getattr(rules, name):g}"]
+                words += [option, str(getattr(rules, name))]
         line = quoted(command("measure", [job.robot], [*words, "--out", out]))
         course = driven.course
         self._ready.set()
@@ -131,11 +130,8 @@ class Measurer:
         self._stopped.set()
         self._started.put(False)
         self._typed.put(None)
-        try:
-            if self._driven is not None:
-                self._driven.stop()
-        except DeviceError as error:
-            self._say(f"the machine did not obey the stop: stop it by hand ({error})")
+        if self._driven is not None:
+            self._driven.stop()
 
     def _ask(self, question: str) -> str:
         self._require_running()
@@ -171,7 +167,7 @@ def _log(given: Table) -> str:
     Raises
     ------
     ValueError
-        A name that is none, or that leads elsewhere.
+        Another name than that of a CSV file, or one that leads out of the folder.
     """
     name = str(given.get("out", ""))
     if safe_name(name) != name or not name.endswith(".csv") or Path(name).is_symlink():

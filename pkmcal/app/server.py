@@ -28,7 +28,7 @@ from pkmcal.app.folder import MOST_FILE, MOST_FOLDER, UPLOAD, Folder
 from pkmcal.app.guard import Application, Guard
 from pkmcal.app.live import Live
 from pkmcal.app.process import Message, Worker
-from pkmcal.exceptions import Error, of_system
+from pkmcal.exceptions import Error, words_of
 from pkmcal.jobs.plan import GCODE
 from pkmcal.jobs.stated import quoted
 from pkmcal.view import scripts
@@ -132,7 +132,7 @@ class Server:
         except Error as error:
             return _refused(400, str(error))
         except OSError as error:  # a full disk, a folder that may only be read
-            return _refused(507, of_system(error))
+            return _refused(507, words_of(error))
         return self._changed(request, taken)
 
     async def undo(self, request: Request) -> Response:
@@ -146,7 +146,7 @@ class Server:
         except Error as error:
             return _refused(400, str(error))
         except OSError as error:
-            return _refused(507, of_system(error))
+            return _refused(507, words_of(error))
 
     def _changed(self, request: Request, taken: bool) -> Response:
         if not taken:
@@ -203,7 +203,7 @@ class Server:
             self._folder.follow()
             self._folder.refuse_links(self._folder.project)
         except (Error, OSError) as error:
-            yield _line({"error": {"message": str(error)}})
+            yield _line({"error": {"message": words_of(error)}})
             return
         job = secrets.token_urlsafe(6)
         stopped = self._running[job] = asyncio.Event()

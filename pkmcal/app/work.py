@@ -27,7 +27,7 @@ from pkmcal.app.sheet import sheet
 from pkmcal.checks.check_geometry import check_geometry
 from pkmcal.controllers.firmwares import Firmware
 from pkmcal.display import printable
-from pkmcal.exceptions import ArgumentError, Error, of_system
+from pkmcal.exceptions import ArgumentError, Error, words_of
 from pkmcal.files.atomic import write_whole
 from pkmcal.geometry.controller import Controller
 from pkmcal.jobs import calibrating, exporting, importing, planning
@@ -313,7 +313,7 @@ OPERATIONS: dict[str, Callable[[Work, Table, Table, Say], Table]] = {
 
 def told(error: BaseException) -> Table:
     """Return an error's words, and the file and line that they begin with."""
-    found: Table = {"message": of_system(error) if isinstance(error, OSError) else str(error)}
+    found: Table = {"message": words_of(error)}
     place = re.match(r"(?:.*/)?([^/:]+), line (\d+)\b", found["message"])
     return {**found, "file": place[1], "line": int(place[2])} if place else found
 

@@ -15,7 +15,7 @@ from typing import Any, TextIO
 
 from pkmcal.cli import interrupt
 from pkmcal.display import printable
-from pkmcal.exceptions import Error, of_system
+from pkmcal.exceptions import Error, words_of
 
 DONE, NOT_TRUSTED, REFUSED, MISTAKE = 0, 1, 2, 3
 _LONGEST = 1000  # letters of a message: names of others may be in it
@@ -50,10 +50,8 @@ def _reason(error: BaseException) -> tuple[str, int]:
         return interrupt.words(error), interrupt.code(error)
     if isinstance(error, MemoryError):
         return "not enough memory for what was given", REFUSED
-    if isinstance(error, OSError):
-        return of_system(error), REFUSED
-    if isinstance(error, Error):
-        return str(error), REFUSED
+    if isinstance(error, (Error, OSError)):
+        return words_of(error), REFUSED
     if hasattr(error, "format_message"):  # typer's, of the command line
         return _of_command_line(error), REFUSED
     return f"a mistake in pkmcal, please report this line: {_of_program(error)}", MISTAKE

@@ -12,7 +12,7 @@ import typer
 
 from pkmcal.cli.options import Free, Prior, RobotOrArm, Seed
 from pkmcal.cli.output import say, tell
-from pkmcal.exceptions import ArgumentError, Error
+from pkmcal.exceptions import ArgumentError, Error, words_of
 from pkmcal.jobs import measuring
 from pkmcal.jobs.inputs import Inputs
 from pkmcal.jobs.measuring import Driven
@@ -217,7 +217,7 @@ def _measured(measurement: Driven, job: Planning, out: Path) -> int:
         tell(f"{course_words.stopped(many, str(out))}: the same command goes on")
         if isinstance(error, KeyboardInterrupt):
             raise
-        tell(error)
+        tell(words_of(error))
         return 1
     code = _ended(last[-1])
     say(quoted(command("calibrate", [job.robot, str(out)], [])))

@@ -114,8 +114,8 @@ class LinuxCNC:
     def _numbers(self, name: str, least: int) -> FloatArray:
         with understood(f"LinuxCNC, {name}"):
             numbers = np.array([float(each) for each in self._get(name).split()])
-        if len(numbers) < least:
-            raise DeviceError(f"LinuxCNC says {len(numbers)} numbers of {name}")
+        if len(numbers) < least or not np.isfinite(numbers[:least]).all():
+            raise DeviceError(f"LinuxCNC says {numbers} of {name}, where {least} are expected")
         return numbers
 
 

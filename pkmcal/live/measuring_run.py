@@ -122,21 +122,20 @@ class MeasuringRun:
             yield course
 
     def stop(self) -> None:
-        """Stop at once: from any thread."""
+        """Stop at once, from any thread; tell it if the machine does not obey."""
         self._stopping.set()
         if self._moving.is_set():
+            self._stop_machine()
+
+    def _stop_machine(self) -> None:
+        try:
             self._machine.stop()
+        except DeviceError as error:
+            self._tell(f"the machine did not obey the stop: stop it by hand ({error})")
 
     def _end_of_move(self) -> None:
         """Stop the machine, also where Ctrl-C comes once more before it has heard."""
-
-        def stop() -> None:
-            try:
-                self._machine.stop()
-            except DeviceError as error:
-                self._tell(f"the machine did not obey the stop: stop it by hand ({error})")
-
-        stopping = threading.Thread(target=stop)
+        stopping = threading.Thread(target=self._stop_machine)
         stopping.start()
         stopping.join()
 

@@ -69,12 +69,13 @@ class Moonraker:
         with understood("Moonraker, toolhead and gcode_move"):
             told = status["gcode_move"]
             there = np.array(status["toolhead"]["position"][:3], dtype=np.float64)
-            off = np.abs(np.array(told["gcode_position"][:3], dtype=np.float64) - there)
+            commanded = np.array(told["gcode_position"][:3], dtype=np.float64)
+            off = np.abs(commanded - there).reshape(3).max()
             speed = float(told["speed_factor"])
             mesh = str((status.get("bed_mesh") or {}).get("profile_name") or "")
-        if not off.max() < _STRAIGHT or len(off) != 3:
+        if not off < _STRAIGHT:
             raise DeviceError(
-                f"an offset or a mesh bends its moves by {off.max():.3f} mm: clear it"
+                f"an offset or a mesh bends its moves by {off:.3f} mm: clear it"
                 " (SET_GCODE_OFFSET X=0 Y=0 Z=0, BED_MESH_CLEAR; after G92, G28)"
             )
         if mesh:

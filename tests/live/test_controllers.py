@@ -197,8 +197,10 @@ def test_an_answer_that_does_not_end_is_not_waited_for(code: int) -> None:
         ({"gcode_move": {"gcode_position": [0, 0, 0, 0], "speed_factor": 2.0}}, "2 times as fast"),
         ({"bed_mesh": {"profile_name": "default"}}, "mesh 'default'"),
         ({"toolhead": {"homed_axes": "xy", "position": [0, 0, 0, 0]}}, "not homed"),
+        ({"toolhead": {"homed_axes": "xyz", "position": []},
+          "gcode_move": {"gcode_position": [], "speed_factor": 1.0}}, "not understood"),
     ],
-)
+)  # fmt: skip
 def test_a_printer_whose_moves_would_be_bent_or_hurried_is_not_moved(
     status: dict[str, Any], message: str
 ) -> None:
