@@ -36,7 +36,8 @@ class Beside(Field):
         for name in given:
             if not isinstance(name, str) or not name.isidentifier():
                 raise ArgumentError(
-                    f"{self.name}: names are letters, digits and _, without blanks; found {name!r}"
+                    f"{self.name}: names are letters, digits and _, and begin with no digit;"
+                    f" found {name!r}"
                 )
         found = np.empty(len(m), dtype=[(name, np.float64) for name in given])
         for name, values in given.items():

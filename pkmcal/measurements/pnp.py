@@ -77,8 +77,7 @@ def from_pnp(
     m = instance("measurements", measurements, Measurements)
     word("on", on, ("base", "platform"))
     for name, value in (("focal", focal), ("noise", noise)):
-        if not number(name, value) > 0.0:
-            raise ArgumentError(f"{name} must be above 0 px; found {value!r}")
+        number(name, value, above=0.0)
     if m.kind != "pose":
         raise ArgumentError(f"measurements: expected poses of a board, found kind {m.kind!r}")
     read = np.isfinite(m.values).all(axis=1)

@@ -19,7 +19,7 @@ from pkmcal.readings import orientation
 from pkmcal.readings.alignment import nearest_rotations
 from pkmcal.statistics.distributions import f_tail
 
-_FEWEST = 4  # corners of a picture that tell where a flat board is; of another one two more
+FEWEST = 4  # corners of a picture that tell where a flat board is; of another one two more
 _UNBENDING = 20  # rounds of undoing the distortion
 _STEPS = 30  # of Levenberg and Marquardt
 _DAMPED = 1e-12  # at least, so that corners in a point or a line have a step
@@ -113,8 +113,8 @@ def unbent(pixel: FloatArray, lens: FloatArray) -> FloatArray:
 def in_a_line(corner: FloatArray, picture: IntArray, pictures: int) -> BoolArray:
     """Pictures (P,) of which corners (N, 3) are in a line, or nearly: they tell no turning."""
     count = np.maximum(np.bincount(picture, minlength=pictures), 1)
-    away = corner - (_summed(corner, picture, pictures) / count[:, None])[picture]
-    squares = _summed(away[:, :, None] * away[:, None, :], picture, pictures)
+    away = corner - (summed(corner, picture, pictures) / count[:, None])[picture]
+    squares = summed(away[:, :, None] * away[:, None, :], picture, pictures)
     size = np.linalg.eigvalsh(squares)
     return np.asarray(size[:, 1] <= _LINE * size[:, 2])
 
@@ -129,7 +129,7 @@ def pictures_told(
     """
     known = np.isfinite(pixel).all(axis=1)
     flat = np.linalg.svd(corner - corner.mean(axis=0), compute_uv=False)
-    fewest = _FEWEST if flat[-1] <= _FLAT * flat[0] else _FEWEST + 2
+    fewest = FEWEST if flat[-1] <= _FLAT * flat[0] else FEWEST + 2
     enough = np.bincount(picture[known], minlength=int(picture.max()) + 1) >= fewest
     enough &= ~in_a_line(corner[known], picture[known], len(enough))
     used = np.flatnonzero(known & enough[picture])
@@ -143,8 +143,8 @@ def mm_per_pixel(corner: FloatArray, pixel: FloatArray, picture: IntArray) -> Fl
     """
     count = np.bincount(picture)
     both = np.hstack([corner, pixel])
-    away = both - (_summed(both, picture) / np.maximum(count, 1)[:, None])[picture]
-    products = _summed(away[:, :3, None] * away[:, None, :], picture)
+    away = both - (summed(both, picture) / np.maximum(count, 1)[:, None])[picture]
+    products = summed(away[:, :3, None] * away[:, None, :], picture)
     size, axes = np.linalg.eigh(products[:, :, :3])
     told = size > _SQUARE * size[:, -1:]
     share = np.where(told, 1.0 / np.where(told, size, 1.0), 0.0)
@@ -182,9 +182,9 @@ def _projection(point: FloatArray, direction: FloatArray, picture: IntArray) -> 
     the smallest eigenvector of the squares is off where a board is small.
     """
     count = np.bincount(picture)[:, None]
-    middle = _summed(direction, picture) / count
+    middle = summed(direction, picture) / count
     off = direction - middle[picture]
-    extent = np.sqrt(_summed(off**2, picture).sum(axis=1, keepdims=True) / count)
+    extent = np.sqrt(summed(off**2, picture).sum(axis=1, keepdims=True) / count)
     off /= extent[picture]
     point = np.column_stack([point, np.ones(len(point))])
     width = point.shape[1]
@@ -192,7 +192,7 @@ def _projection(point: FloatArray, direction: FloatArray, picture: IntArray) -> 
     for i in range(2):
         rows[:, i, i * width : (i + 1) * width] = point
         rows[:, i, 2 * width :] = -off[:, i, None] * point
-    _, vectors = np.linalg.eigh(_summed(rows.transpose(0, 2, 1) @ rows, picture))
+    _, vectors = np.linalg.eigh(summed(rows.transpose(0, 2, 1) @ rows, picture))
     found = vectors[:, :, 0].reshape(-1, 3, width)
     found[:, :2] *= extent[:, :, None]
     found[:, :2] += middle[:, :, None] * found[:, 2:]
@@ -287,9 +287,9 @@ def _equations(
     seen[~(depth > 0)] = np.inf
     off = pixel - seen
     with np.errstate(invalid="ignore"):
-        squares = _summed((off**2).sum(axis=1), picture)
-        normal = _summed(by_twist.transpose(0, 2, 1) @ by_twist, picture)
-        pull = _summed((by_twist.transpose(0, 2, 1) @ off[:, :, None])[:, :, 0], picture)
+        squares = summed((off**2).sum(axis=1), picture)
+        normal = summed(by_twist.transpose(0, 2, 1) @ by_twist, picture)
+        pull = summed((by_twist.transpose(0, 2, 1) @ off[:, :, None])[:, :, 0], picture)
     return np.where(np.isfinite(squares), squares, np.inf), normal, pull
 
 
@@ -299,7 +299,7 @@ def _moved(pose: FloatArray, twist: FloatArray) -> FloatArray:
     return screws.pose(moved.reshape(-1, 16))
 
 
-def _summed(rows: FloatArray, picture: IntArray, pictures: int = 0) -> FloatArray:
+def summed(rows: FloatArray, picture: IntArray, pictures: int = 0) -> FloatArray:
     """Sums (P, ...) of the rows of each picture; there are `pictures` at least."""
     columns = rows.reshape(len(rows), -1).T
     total = np.stack([np.bincount(picture, column, pictures) for column in columns], axis=1)

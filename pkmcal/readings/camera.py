@@ -28,8 +28,15 @@ from pkmcal.readings import rows, twists
 from pkmcal.readings.alignment import Laid, Sighting, frame_of_poses
 from pkmcal.readings.board_poses import mm_per_pixel, pictures_told
 from pkmcal.readings.boards import Board
-from pkmcal.readings.lens import FOUND, LENS, Found, covariance_of_lens, numbers_of_lens
-from pkmcal.readings.lens_doubts import lens_doubts
+from pkmcal.readings.lens import (
+    FOUND,
+    LENS,
+    Found,
+    covariance_of_lens,
+    numbers_of_lens,
+    size_of_pictures,
+)
+from pkmcal.readings.lens_doubts import lens_doubts, pixels_outside
 from pkmcal.readings.lens_files import read_lens, write_lens
 from pkmcal.readings.measured import InFit, Measured
 from pkmcal.readings.pictures import Picture, pictures
@@ -199,7 +206,7 @@ class Camera(Reading):
         corner = np.atleast_2d(np.asarray(self.corner, dtype=np.float64))
         (left, top, low), (right, bottom, high) = corner.min(axis=0), corner.max(axis=0)
         depth = 0.5 * float(low + high)
-        width, height = self.width or 2.0 * self.cx + 1.0, self.height or 2.0 * self.cy + 1.0
+        lens = self.lens_numbers()
         camera, board = places if self.on == "base" else places[::-1]
         return {
             "name": self.camera_name or "camera",
@@ -210,8 +217,8 @@ class Camera(Reading):
                 [float(x), float(y), depth]
                 for x, y in ((left, top), (right, top), (right, bottom), (left, bottom))
             ],
-            "lens": self.lens_numbers().tolist(),
-            "size": [float(width), float(height)],
+            "lens": lens.tolist(),
+            "size": [*size_of_pictures(lens, (self.width, self.height))],
         }
 
     @property
@@ -377,10 +384,7 @@ class Camera(Reading):
 
     def _boards(self, pose: FloatArray) -> FloatArray:
         """Boards (N, 4, 4) in axes of a camera whose place is known."""
-        stands, carried = (
-            screws.frames(np.asarray(each, dtype=np.float64)[None])
-            for each in (self.stands, self.carried)
-        )
+        stands, carried = self.motions.values()
         board: FloatArray = stands @ screws.frames(np.ascontiguousarray(pose)) @ carried
         return board if self.on == "base" else np.asarray(np.linalg.inv(board), dtype=np.float64)
 
@@ -405,25 +409,14 @@ class Camera(Reading):
         return found
 
     def doubts(self, m: Measured) -> Iterator[str]:
-        """Lenses of turned or rectified pictures, mirrored pictures."""
+        """Pixels outside of pictures, lenses of other pictures, boards seen from behind."""
         used, number = self._pictures_told(m)
-        yield from self._outside(m)
+        size = self.width, self.height
+        yield from pixels_outside(m.values, size)
         if not len(used) or self.lens != "none":
             return
-        corner, size = self._corners(len(m))[used], (self.width, self.height)
+        corner = self._corners(len(m))[used]
         yield from lens_doubts(corner, m.values[used], self.lens_numbers(), number, size)
-
-    def _outside(self, m: Measured) -> Iterator[str]:
-        """Say that pixels are where pictures of this camera end."""
-        for name, way, end, seen in zip(
-            "uv", ("wide", "high"), (self.width, self.height), m.values.T, strict=True
-        ):
-            most, least = np.nanmax(seen, initial=0.0), np.nanmin(seen, initial=0.0)
-            if end and (most > end or least < -1.0):
-                yield (
-                    f"{name} reaches from {least:.0f} to {most:.0f} px, and pictures of this camera"
-                    f" are {end} px {way}: the lens is of pictures of another size, or turned"
-                )
 
     def _pictures_told(self, m: Measured) -> tuple[IntArray, IntArray]:
         """Rows (n,) of pictures that tell where a board is, and which picture each is of (n,)."""

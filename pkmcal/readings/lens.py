@@ -70,6 +70,15 @@ def numbers_of_lens(
     )
 
 
+def size_of_pictures(lens: FloatArray, size: tuple[int, int]) -> tuple[float, float]:
+    """Width and height of pictures, px; one that is not known, 0, as if the lens were centred."""
+    width, height = (
+        float(end) or 2.0 * middle + 1.0
+        for end, middle in zip(size, lens[2:4].tolist(), strict=True)
+    )
+    return width, height
+
+
 def covariance_of_lens(given: ArrayLike) -> FloatArray:
     """Covariance (9, 9) of a lens, of nine deviations or of a covariance; 0 of what is exact.
 

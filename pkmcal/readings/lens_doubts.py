@@ -8,8 +8,8 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.core import instruments
-from pkmcal.readings.board_poses import BoardPoses, board_poses, facing
-from pkmcal.readings.lens import LENS
+from pkmcal.readings.board_poses import FEWEST, BoardPoses, board_poses, facing
+from pkmcal.readings.lens import LENS, size_of_pictures
 
 _FALLS = (
     3.0  # times less that corners are off with another lens, from which on that is the right one
@@ -17,7 +17,6 @@ _FALLS = (
 _CLEAR = 0.3  # px that corners are off at least, to doubt a lens
 _MIDDLE = 0.1  # share of a picture by which the principal point is off its middle, at most
 _STEPS = 6  # towards a better lens
-_FEWEST = 4  # corners of a picture that tells something of it
 _TOLD = 1e-6  # of the largest singular value, from which combinations of its numbers are told
 _FITS = 1.5  # times less that corners are off with a lens that fits as well as the best one
 _AS_WELL = 1.1  # times what corners are off with the best one
@@ -63,18 +62,17 @@ def lens_doubts(
     ends = np.array([end or 1.0 + last for end, last in zip(size, most, strict=True)])
     if (off > _CLEAR and not said) or (np.abs(lens[2:4] / ends - 0.5) > _MIDDLE).any():
         other, least = _better(corner, pixel, lens, picture, found)
-        others = dict(_kindred(lens, size))
-        tried = {
-            how: _typical(board_poses(corner, pixel, each, picture)) for how, each in others.items()
-        }
-        how = min(tried, key=lambda each: tried[each])
-        left = tried[how]
+        tried = [
+            (_typical(board_poses(corner, pixel, each, picture)), what, how)
+            for what, how, each in _kindred(lens, size)
+        ]
+        left, what, how = min(tried, key=lambda each: each[0])
         fits = left * _FITS < off and left < _AS_WELL * least
         if left * _FALLS < max(off, _CLEAR) or fits:
             yield (
-                f"the lens is that of {how.partition(':')[0]} pictures: its middle is at"
+                f"the lens is that of {what} pictures: its middle is at"
                 f" {lens[2]:.0f}, {lens[3]:.0f} and pixels reach {most[0]:.0f}, {most[1]:.0f};"
-                f" {how.partition(': ')[2]} corners are {left:.3g} px off in place of {off:.3g}:"
+                f" with {how} corners are {left:.3g} px off in place of {off:.3g}:"
                 " state the lens of these pictures, or give them as the lens was calibrated"
             )
         elif off > _CLEAR and not said and least * _FALLS < off:
@@ -95,27 +93,34 @@ def lens_doubts(
         )
 
 
-def _kindred(lens: FloatArray, size: tuple[int, int]) -> Iterator[tuple[str, FloatArray]]:
-    """Lenses (9,) of the same pictures, turned or of another size, by what they are and how.
+def pixels_outside(pixel: FloatArray, size: tuple[int, int]) -> Iterator[str]:
+    """Say that pixels (N, 2), NaN where nothing is seen, are beyond the edges of their pictures."""
+    for name, way, end, seen in zip("uv", ("wide", "high"), size, pixel.T, strict=True):
+        most, least = np.nanmax(seen, initial=0.0), np.nanmin(seen, initial=0.0)
+        if end and (most > end or least < -1.0):
+            yield (
+                f"{name} reaches from {least:.0f} to {most:.0f} px, and pictures of this camera"
+                f" are {end} px {way}: the lens is of pictures of another size, or turned"
+            )
 
-    Of pictures of unknown size the middle of the lens is taken for their middle.
-    """
+
+def _kindred(lens: FloatArray, size: tuple[int, int]) -> Iterator[tuple[str, str, FloatArray]]:
+    """Lenses (9,) of the same pictures, turned or of another size: what they are, and the lens."""
     fx, fy, cx, cy, k1, k2, p1, p2, k3 = lens.tolist()
-    right, low = (
-        (end or 2.0 * middle + 1.0) - 1.0 for end, middle in zip(size, (cx, cy), strict=True)
-    )
+    right, low = (end - 1.0 for end in size_of_pictures(lens, size))
     turned = {
-        "turned: turned by 90 deg to the right": (fy, fx, low - cy, cx, p2, -p1),
-        "turned: turned by 90 deg to the left": (fy, fx, cy, right - cx, -p2, p1),
-        "turned: upside down": (fx, fy, right - cx, low - cy, -p1, -p2),
+        "the lens turned by 90 deg to the right": (fy, fx, low - cy, cx, p2, -p1),
+        "the lens turned by 90 deg to the left": (fy, fx, cy, right - cx, -p2, p1),
+        "the lens upside down": (fx, fy, right - cx, low - cy, -p1, -p2),
     }
-    yield "turned: with x and y exchanged", lens[list(_EXCHANGED)]
+    yield "turned", "x and y exchanged", lens[list(_EXCHANGED)]
     for how, (*focal, p, q) in turned.items():
-        yield how, np.array([*focal, k1, k2, p, q, k3])
+        yield "turned", how, np.array([*focal, k1, k2, p, q, k3])
     for scale in _SCALES:
         middle = (lens[2:4] + 0.5) * scale - 0.5
         yield (
-            f"larger or smaller: with the lens times {scale:.3g}",
+            "larger or smaller",
+            f"the lens times {scale:.3g}",
             np.concatenate([lens[:2] * scale, middle, lens[4:]]),
         )
 
@@ -140,7 +145,7 @@ def _better(
         rows = []
         for each in range(len(pose)):
             mine = np.flatnonzero((picture == each) & np.isfinite(whole).all(axis=(1, 2)))
-            if len(mine) < _FEWEST:
+            if len(mine) < FEWEST:
                 continue
             motion, _ = np.linalg.qr(by_motion[mine].reshape(-1, 6))
             own = whole[mine].reshape(-1, 9)

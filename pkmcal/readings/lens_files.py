@@ -155,13 +155,13 @@ def _sigma(known: Mapping[str, Any], file: str) -> FloatArray | None:
     A focal length that was held in proportion to the other is wrong by as much as that.
     """
     if _COVARIANCE in known:
-        found = np.array(_numbers(known[_COVARIANCE]))
+        found = np.array(_list(known, (_COVARIANCE,), file))
         if found.size != 81:
             raise FileError(f"{file}: {_COVARIANCE} has {found.size} numbers, 9 x 9 are needed")
         return found.reshape(9, 9)
-    stated = _numbers(_first(known, _SIGMA))
+    stated = _list(known, _SIGMA, file)
     if not stated:
-        parts = [_numbers(known.get(name)) for name, _ in _SIGMA_OF_PARTS]
+        parts = [_list(known, (name,), file) for name, _ in _SIGMA_OF_PARTS]
         if not any(parts):
             return None
         for (name, count), part in zip(_SIGMA_OF_PARTS, parts, strict=True):
@@ -169,7 +169,7 @@ def _sigma(known: Mapping[str, Any], file: str) -> FloatArray | None:
                 raise FileError(f"{file}: {name} has {len(part)} numbers, {count} are needed")
         stated = [number for part in parts for number in part]
     sigma = np.array([*stated, *[0.0] * 9][:9])
-    if not np.isfinite(sigma).all() or (sigma < 0.0).any():
+    if (sigma < 0.0).any():
         raise FileError(f"{file}: standard deviations of a lens must be 0 or above")
     covariance = np.diag(sigma**2)
     if (sigma[0] == 0.0) != (sigma[1] == 0.0):

@@ -7,9 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
-from pkmcal.readings.board_poses import in_a_line
-
-_FEWEST = 4  # corners that tell a motion of a flat board
+from pkmcal.readings.board_poses import FEWEST, in_a_line
 
 
 @dataclass(frozen=True)
@@ -91,7 +89,7 @@ def pictures(
         tilt = float(np.arccos(np.clip(abs(sight @ motion[:3, 2]), 0.0, 1.0)))
         across = along = turned = rest = float("nan")
         one = np.zeros(len(mine), dtype=np.intp)
-        if len(mine) >= _FEWEST and not in_a_line(corner[mine], one, 1)[0]:
+        if len(mine) >= FEWEST and not in_a_line(corner[mine], one, 1)[0]:
             rates, seen = by_motion[mine].reshape(-1, 6), off[mine].ravel()
             size = np.linalg.norm(rates, axis=0)
             twist = np.linalg.lstsq(rates / size, seen, rcond=None)[0] / size

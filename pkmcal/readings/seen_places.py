@@ -15,7 +15,7 @@ from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.core.poses import compose
 from pkmcal.exceptions import ArgumentError
 from pkmcal.readings import orientation, twists
-from pkmcal.readings.board_poses import board_poses, facing
+from pkmcal.readings.board_poses import board_poses, facing, summed
 from pkmcal.readings.hand_eye import of_frame_and_tool
 
 _FEWEST = 4  # pictures, more of which tell that they are mirrored
@@ -85,11 +85,12 @@ def tool_places(
         for how, trial in trials.items()
     }
     how = min(found, key=lambda each: found[each])
-    fits = f", and by {np.degrees(found[how]):.2g} deg {how}"
-    if found[how] * _FALLS < off or off > _GROSS:
+    fits = found[how] * _FALLS < off
+    if fits or off > _GROSS:
+        better = f", and by {np.degrees(found[how]):.2g} deg {how}" if fits else ""
         raise ArgumentError(
             f"measurements: where pictures show the board differs by {np.degrees(off):.2g} deg from"
-            f" how the machine moves{fits if found[how] * _FALLS < off else ''}: pictures and"
+            f" how the machine moves{better}: pictures and"
             " actuators have to belong together, row by row; check what the camera is on, and signs"
             " and units of the actuators"
         )
@@ -117,7 +118,7 @@ def _agreed(
 def _require_the_board(pixel: FloatArray, picture: IntArray, off: FloatArray) -> None:
     """Refuse pictures that do not show the board: most corners are far from where it has them."""
     count = np.bincount(picture)
-    middle = np.stack([np.bincount(picture, each) for each in pixel.T], axis=1) / count[:, None]
+    middle = summed(pixel, picture) / count[:, None]
     away = np.linalg.norm(pixel - middle[picture], axis=1)
     extent = 2.0 * np.sqrt(np.bincount(picture, away**2) / count)
     many = count >= _MANY  # of fewer the search for their place may end elsewhere

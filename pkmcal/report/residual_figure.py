@@ -25,7 +25,7 @@ _FEW = 0.1  # of the residuals: more say that all are further off than stated
 _LEAST = 1e-9  # of other lengths: arrows that nobody sees
 _ROOM = 1.3  # of a panel, in the largest value that it shows
 _LOOKS = ((BLUE, "o"), (ORANGE, "s"), (GREEN, "^"))
-_FIRST = ("mm", "rad")
+_FIRST = ("mm", "rad")  # units whose panels stand above those of others
 _ALONE = (PINK, "D")  # of readings of one component
 
 

@@ -134,6 +134,10 @@ def test_a_focal_length_in_proportion_to_the_other_is_wrong_with_it(tmp_path: Pa
         ("stdDeviationsIntrinsics: [ -1, 1, 1, 1 ]\n", "0 or above"),
         ("lens_covariance: [ 1, 2, 3 ]\n", "3 numbers, 9 x 9"),
         ("cameraMatrix_std_dev: [ 1, 2 ]\n", "2 numbers, 4 are needed"),
+        ("stdDeviationsIntrinsics: see sheet 3\n", "expected a list of finite numbers"),
+        ('lens_covariance: "9 x 9, in another file"\n', "expected a list of finite numbers"),
+        ("standard_deviations:\n  fx: 1.0\n  fy: 1.0\n", "expected a list of finite numbers"),
+        ("dist_coeffs_std_dev: [ .nan, 1, 1, 1, 1 ]\n", "expected a list of finite numbers"),
     ],
 )
 def test_deviations_that_do_not_fit_name_the_file(tmp_path: Path, text: str, message: Any) -> None:
