@@ -44,7 +44,7 @@ _NAMED_PROBE = "probe_eddy_current "
 
 
 def of_klipper(path: str | PathLike[str]) -> Stored:
-    """The robot file of a printer.cfg, and what DELTACALIBRATE and DELTA_ANALYZE stored.
+    """The robot file of a printer.cfg, and what DELTA_CALIBRATE and DELTA_ANALYZE stored.
 
     Raises
     ------
@@ -70,7 +70,7 @@ def of_klipper(path: str | PathLike[str]) -> Stored:
         bed = klipper_bed.of_linear(printer, delta)
         text = linear_delta.text_of(delta, steps, about, bed=bed, rods=rods)
     if heights is None:
-        unread = (*unread, "DELTACALIBRATE, then SAVE_CONFIG, store heights in it")
+        unread = (*unread, "DELTA_CALIBRATE, then SAVE_CONFIG, store heights in it")
     return Stored(text, heights, distances, (*notes, *unread))
 
 

@@ -96,7 +96,7 @@ def test_a_probe_of_klipper_that_is_not_read_is_said(
     assert probe_of(printer) is None
     note, heights = printer.notes
     assert re.search(why, note), note
-    assert "store heights" in heights  # it has none
+    assert "DELTA_CALIBRATE, then SAVE_CONFIG, store heights" in heights  # it has none
 
 
 def test_a_second_probe_of_klipper_is_refused_without_a_height_too(tmp_path: Path) -> None:
