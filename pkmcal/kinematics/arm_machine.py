@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -12,7 +12,6 @@ from pkmcal.arms.arm import SerialArm
 from pkmcal.arms.arm_geometry import arm_geometry
 from pkmcal.arrays import BoolArray, FloatArray, Int32Array, Unit, as_rows
 from pkmcal.core import screws
-from pkmcal.geometry.box import Box
 from pkmcal.geometry.carried import Load
 from pkmcal.geometry.stated_uncertainty import NOTHING, StatedUncertainty
 
@@ -36,7 +35,6 @@ class ArmModel:
     load: None = None
     balanced_load: None = None
     controller: None = None
-    workspace: Box = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 from pkmcal.arguments import instance
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import BoolArray, FloatArray, Int32Array, Unit
-from pkmcal.geometry.box import Box
 from pkmcal.geometry.carried import Load
 from pkmcal.geometry.chains import Chains
 from pkmcal.geometry.controller import Controller
@@ -114,10 +113,6 @@ class Declarations(Protocol):
     @property
     def balanced_load(self) -> CableLoad | None:
         """The load that tensions of the rows balance."""
-
-    @property
-    def workspace(self) -> Box:
-        """Least and largest value of coordinates of the pose."""
 
     @property
     def controller(self) -> Controller | None:
