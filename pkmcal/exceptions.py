@@ -44,7 +44,8 @@ class CalibrationWarning(_Shown, UserWarning):
 
 def words_of(error: BaseException) -> str:
     """Return the words of an error; of one of the system the file that it is about first."""
-    if isinstance(error, OSError) and type(error).__str__ is OSError.__str__:
-        if error.strerror and error.filename:
-            return f"{error.filename}: {error.strerror}"
-    return str(error)
+    if not isinstance(error, OSError) or type(error).__str__ is not OSError.__str__:
+        return str(error)
+    if not (error.strerror and error.filename):
+        return str(error)
+    return f"{error.filename}: {error.strerror}"
