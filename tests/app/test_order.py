@@ -1,4 +1,4 @@
-"""Answers that come late, or in another order than they were asked for, change nothing that is shown.
+"""Answers that come late, or in another order, are neither shown nor counted, and nothing is lost.
 
 What a page asks for is held here and let go by the test, so that every order is certain.
 """
@@ -15,7 +15,8 @@ import pytest
 
 pytest.importorskip("starlette", reason="the extra app is not installed")
 pytest.importorskip("uvicorn", reason="the extra app is not installed")
-Error = pytest.importorskip("playwright.sync_api", reason="no Playwright: make test-app").Error
+pytest.importorskip("playwright.sync_api", reason="no Playwright: make test-app")
+from playwright.sync_api import Error
 
 from . import browser
 from .test_flows import PRINTER, fits, tracked
