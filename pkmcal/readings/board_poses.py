@@ -15,12 +15,14 @@ import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.core import instruments, screws
+from pkmcal.core.elimination import PoseEquations
 from pkmcal.readings import orientation
 from pkmcal.readings.alignment import nearest_rotations
 from pkmcal.statistics.distributions import f_tail
 
 FEWEST = 4  # corners of a picture that tell where a flat board is; of another one two more
 _UNBENDING = 20  # rounds of undoing the distortion
+_UNBENT = 1e-15  # change of a direction at which it is undone
 _STEPS = 30  # of Levenberg and Marquardt
 _DAMPED = 1e-12  # at least, so that corners in a point or a line have a step
 _SMALL = 1e-10  # step, as a share of the distance and in rad, at which a place is found
@@ -67,7 +69,9 @@ def board_poses(
     picture : ndarray of int (N,)
         Which picture each is of, 0 … P - 1. Four corners of a flat board, or six, are needed.
     """
-    lens = np.broadcast_to(lens, (len(pixel), 9)).copy()
+    order = np.argsort(picture, kind="stable")
+    corner, pixel, picture = corner[order], pixel[order], picture[order]
+    lens = np.broadcast_to(lens, (len(pixel), 9))[order]
     direction = unbent(pixel, lens)
     folded = ~np.isfinite(direction).all(axis=1)  # with a lens of other pictures: a guess will do
     direction[folded] = (pixel[folded] - lens[folded, 2:4]) / lens[folded, :2]
@@ -105,7 +109,12 @@ def unbent(pixel: FloatArray, lens: FloatArray) -> FloatArray:
         level[:, :2], level[:, 2] = found, 1.0
         seen, by_twist, *_ = instruments.pixels(level, corner, lens)
         off = seen - pixel
-        found = found - np.linalg.solve(by_twist[:, :, 3:5], off[:, :, None])[:, :, 0]
+        (a, b), (c, d) = by_twist[:, :, 3:5].transpose(1, 2, 0)
+        step = np.array([d, -c]) * off[:, 0] + np.array([-b, a]) * off[:, 1]
+        step /= a * d - b * c
+        found -= step.T
+        if not (np.abs(step) > _UNBENT).any():
+            break
     found[~(np.abs(off).max(axis=1) < 1e-6 * lens[:, 0])] = np.nan
     return found
 
@@ -261,8 +270,10 @@ def _refined(
         damped = scaled + damping[moving, None, None] * np.eye(6)
         step = np.linalg.solve(damped, (pull[moving] / size)[:, :, None])[:, :, 0] / size
         trial = _moved(pose[moving], step)
-        rows = np.flatnonzero(np.isin(picture, moving))
-        among = np.searchsorted(moving, picture[rows])
+        among = np.full(len(pose), -1)
+        among[moving] = np.arange(len(moving))
+        rows = np.flatnonzero(among[picture] >= 0)
+        among = among[picture[rows]]
         new = _equations(trial, corner[rows], pixel[rows], lens[rows], among)
         better = new[0] <= cost[moving]
         pose[moving[better]] = trial[better]
@@ -280,16 +291,15 @@ def _equations(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Sum of squares (P,), normal matrix (P, 6, 6) and right side (P, 6) by the board's twist.
 
-    Infinite where a corner is not before the camera.
+    Infinite where a corner is not before the camera. Rows are picture by picture.
     """
     at = np.ascontiguousarray(pose[picture])
     seen, by_twist, _, _, depth = instruments.pixels(at, corner, lens)
     seen[~(depth > 0)] = np.inf
-    off = pixel - seen
-    with np.errstate(invalid="ignore"):
-        squares = summed((off**2).sum(axis=1), picture)
-        normal = summed(by_twist.transpose(0, 2, 1) @ by_twist, picture)
-        pull = summed((by_twist.transpose(0, 2, 1) @ off[:, :, None])[:, :, 0], picture)
+    off = (pixel - seen).ravel()
+    numbers = 2 * np.bincount(picture, minlength=len(pose))
+    of_pictures = PoseEquations(np.arange(len(off)), numbers, 6)
+    normal, pull, squares = of_pictures.normals(off, by_twist.reshape(-1, 6))
     return np.where(np.isfinite(squares), squares, np.inf), normal, pull
 
 
@@ -301,7 +311,11 @@ def _moved(pose: FloatArray, twist: FloatArray) -> FloatArray:
 
 def summed(rows: FloatArray, picture: IntArray, pictures: int = 0) -> FloatArray:
     """Sums (P, ...) of the rows of each picture; there are `pictures` at least."""
-    columns = rows.reshape(len(rows), -1).T
-    total = np.stack([np.bincount(picture, column, pictures) for column in columns], axis=1)
-    found: FloatArray = total.reshape(len(total), *rows.shape[1:]).astype(np.float64, copy=False)
+    count = np.bincount(picture, minlength=pictures)
+    if (picture[1:] < picture[:-1]).any():
+        rows = rows[np.argsort(picture, kind="stable")]
+    found = np.zeros((len(count), *rows.shape[1:]))
+    shown = count > 0
+    if shown.any():
+        found[shown] = np.add.reduceat(rows, (np.cumsum(count) - count)[shown])
     return found
