@@ -9,6 +9,7 @@ Own code: a table of pixels is enough to calibrate a machine, without a library 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +24,7 @@ from pkmcal.statistics.distributions import f_tail
 FEWEST = 4  # corners of a picture that tell where a flat board is; of another one two more
 _UNBENDING = 20  # rounds of undoing the distortion
 _UNBENT = 1e-15  # change of a direction at which it is undone
+_LOST = 0.05  # of the extent in a picture, by which its corners are off where the search is lost
 _STEPS = 30  # of Levenberg and Marquardt
 _DAMPED = 1e-12  # at least, so that corners in a point or a line have a step
 _SMALL = 1e-10  # step, as a share of the distance and in rad, at which a place is found
@@ -77,9 +79,17 @@ def board_poses(
     direction[folded] = (pixel[folded] - lens[folded, 2:4]) / lens[folded, :2]
     found = [
         _refined(guess, corner, pixel, lens, picture)
-        for guess in _guessed(corner, direction, picture)
+        for guess in _guessed(corner, direction, picture, _projection)
     ]
     pose, rms = (np.stack(each, axis=1) for each in zip(*found, strict=True))
+    lost = np.flatnonzero(~(rms.min(axis=1) <= _LOST * _extents(pixel, picture)))
+    if len(lost):
+        rows, among = _of_pictures(lost, picture, len(pose))
+        some = corner[rows], pixel[rows], lens[rows], among
+        for i, guess in enumerate(_guessed(some[0], direction[rows], among, _affinity)):
+            again, off = _refined(guess, *some)
+            better = off < rms[lost, i]
+            pose[lost[better], i], rms[lost[better], i] = again[better], off[better]
     turn = orientation.between(pose[:, 1, 3:], pose[:, 0, 3:])
     swap = rms[:, 1] < rms[:, 0]
     pose[swap], rms[swap] = pose[swap, ::-1], rms[swap, ::-1]
@@ -164,19 +174,41 @@ def mm_per_pixel(corner: FloatArray, pixel: FloatArray, picture: IntArray) -> Fl
     return found
 
 
+def _of_pictures(some: IntArray, picture: IntArray, pictures: int) -> tuple[IntArray, IntArray]:
+    """Rows (n,) of some pictures, and which of these each is of (n,)."""
+    among = np.full(pictures, -1)
+    among[some] = np.arange(len(some))
+    rows = np.flatnonzero(among[picture] >= 0)
+    return rows, among[picture[rows]]
+
+
+def _extents(pixel: FloatArray, picture: IntArray) -> FloatArray:
+    """Rms distance of pixels (N, 2) from the middle of their picture (P,)."""
+    count = np.bincount(picture)
+    off = pixel - (summed(pixel, picture) / count[:, None])[picture]
+    extent: FloatArray = np.sqrt(summed((off**2).sum(axis=1), picture) / count)
+    return extent
+
+
 def _guessed(
-    corner: FloatArray, direction: FloatArray, picture: IntArray
+    corner: FloatArray,
+    direction: FloatArray,
+    picture: IntArray,
+    projected: Callable[[FloatArray, FloatArray, IntArray], FloatArray],
 ) -> tuple[FloatArray, FloatArray]:
-    """Two places (P, 6) each to search from; of a board that is not flat they are one."""
+    """Two places (P, 6) each to search from; of a board that is not flat they are one.
+
+    `projected` finds the projection of each picture.
+    """
     middle = corner.mean(axis=0)
     axes = np.linalg.svd(corner - middle, full_matrices=False)[2]
     axes[2] *= np.sign(np.linalg.det(axes))
     own = (corner - middle) @ axes.T  # the board from its middle, the third axis across it
     size = float(np.abs(own).max())
     if float(np.abs(own[:, 2]).max()) < _FLAT * size:
-        turns, place = _of_flat(_projection(own[:, :2] / size, direction, picture), size)
+        turns, place = _of_flat(projected(own[:, :2] / size, direction, picture), size)
     else:
-        projection = _projection(own / size, direction, picture)
+        projection = projected(own / size, direction, picture)
         scale = np.cbrt(np.abs(np.linalg.det(projection[:, :, :3])))[:, None]
         turns = [nearest_rotations(projection[:, :, :3] / scale[:, None])] * 2
         place = projection[:, :, 3] * size / scale
@@ -207,6 +239,23 @@ def _projection(point: FloatArray, direction: FloatArray, picture: IntArray) -> 
     found[:, :2] += middle[:, :, None] * found[:, 2:]
     before: FloatArray = found * np.where(found[:, 2:, -1:] < 0, -1.0, 1.0)
     return before
+
+
+def _affinity(point: FloatArray, direction: FloatArray, picture: IntArray) -> FloatArray:
+    """Return `_projection` as if from far away: three points tell it of a flat board.
+
+    Four tell a projection, but not where three of them are in a line.
+    """
+    point = np.column_stack([point, np.ones(len(point))])
+    squares = summed(point[:, :, None] * point[:, None, :], picture)
+    products = summed(point[:, :, None] * direction[:, None, :], picture)
+    found = np.zeros((len(squares), 3, point.shape[1]))
+    found[:, :2] = (np.linalg.pinv(squares, hermitian=True) @ products).transpose(0, 2, 1)
+    if point.shape[1] > 3:
+        third = np.cross(found[:, 0, :3], found[:, 1, :3])
+        found[:, 2, :3] = third / np.sqrt(np.linalg.norm(third, axis=1, keepdims=True))
+    found[:, 2, -1] = 1.0
+    return found
 
 
 def _of_flat(plane: FloatArray, size: float) -> tuple[list[FloatArray], FloatArray]:
@@ -270,10 +319,7 @@ def _refined(
         damped = scaled + damping[moving, None, None] * np.eye(6)
         step = np.linalg.solve(damped, (pull[moving] / size)[:, :, None])[:, :, 0] / size
         trial = _moved(pose[moving], step)
-        among = np.full(len(pose), -1)
-        among[moving] = np.arange(len(moving))
-        rows = np.flatnonzero(among[picture] >= 0)
-        among = among[picture[rows]]
+        rows, among = _of_pictures(moving, picture, len(pose))
         new = _equations(trial, corner[rows], pixel[rows], lens[rows], among)
         better = new[0] <= cost[moving]
         pose[moving[better]] = trial[better]
