@@ -236,6 +236,10 @@ class Reading:
         """
         return None
 
+    def not_apart(self, m: Measured, fitted: Measured) -> str:
+        """The reason why rows tell nothing that is held out of others; "" where they do."""
+        return ""
+
     def shared(self, at: At, lots: Lots, **numbers: FloatArray) -> Shared:
         """Compute `predict` through the motions of lots of rows at one place each.
 
