@@ -144,16 +144,18 @@ def furthest_axis(direction: FloatArray) -> int:
     return first_largest(-along, TIED * float(along.max()))
 
 
-def lots(count: int, most: int = 16384) -> Iterator[slice]:
+def lots(count: int, most: int = 16384, first: int = 0) -> Iterator[slice]:
     """Slices of so many rows, one after another, to bound the memory of what is made of them.
+
+    They begin at row `first`.
 
     Examples
     --------
     >>> list(lots(5, 3))
     [slice(0, 3, None), slice(3, 6, None)]
     """
-    for first in range(0, count, most):
-        yield slice(first, first + most)
+    for start in range(first, count, most):
+        yield slice(start, start + most)
 
 
 def first_of_equal(rows: FloatArray) -> IntArray:

@@ -254,19 +254,15 @@ class Equations:
             factors = np.ones(len(self.blocks.unstated)) if noise is None else noise
             states, system = self.system.best(machines, states, theta, factors)
             cache["system"] = self.system, factors, system
-        predicted = self.prediction.at(states.pose, theta)
         if len(self.table.rows) <= _TOGETHER:
+            predicted = self.prediction.at(states.pose, theta)
             cache["predicted"] = self.prediction, predicted
-        return Evaluation(
-            theta,
-            self.parameters,
-            machines,
-            states,
-            self.prediction.of_rows(predicted),
-            self.prediction.residuals(predicted),
-            self._begun(near),
-            cache,
-        )
+            values = self.prediction.of_rows(predicted)
+            residuals = self.prediction.residuals(predicted)
+        else:
+            values, residuals = self.prediction.seen(states.pose, theta)
+        begun = self._begun(near)
+        return Evaluation(theta, self.parameters, machines, states, values, residuals, begun, cache)
 
     def kept(self, evaluation: Evaluation) -> Evaluation:
         """An evaluation by other equations of the same rows, as by these."""
