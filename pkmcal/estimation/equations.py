@@ -203,6 +203,14 @@ class Equations:
             return self
         return replace(self, prediction=replace(self.prediction, parameters=parameters))
 
+    def with_more(self, datasets: Sequence[FitData], parameters: Parameters) -> Equations:
+        """The equations of the same rows by further parameters, weighted as these are."""
+        table = self.table.with_parameters(datasets, parameters)
+        if table is not None:
+            return replace(self, prediction=Prediction.of(datasets, parameters, table), whole=None)
+        equations = Equations.of(datasets, parameters).reweighted(self.whitening.deviations)
+        return replace(equations, blocks=self.blocks)  # slack cables count in neither
+
     def with_tension(self, tension: FloatArray | None) -> Equations:
         """The equations under tensions (K, n) of what the actuators drive; None: as they are."""
         if tension is None:

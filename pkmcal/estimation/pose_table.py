@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -87,6 +87,22 @@ class PoseTable:
         """The poses of each machine."""
         machines = range(len(self.machine_columns))
         return tuple(np.flatnonzero(self.machine_of_pose == s) for s in machines)
+
+    def with_parameters(
+        self, datasets: Sequence[FitData], parameters: Parameters
+    ) -> PoseTable | None:
+        """The table of the same rows by other parameters; None where its poses are others.
+
+        That is where machines of sessions differ that did not, or the reverse.
+        """
+        columns, part_of = parameters.columns_of(datasets)
+        machine_columns, machine_of = _machines(columns[:, : len(parameters.places)], part_of)
+        pairs = zip(machine_of, self.pose_of, strict=True)
+        if len(machine_columns) != len(self.machine_columns) or not all(
+            np.array_equal(of_row, self.machine_of_pose[pose]) for of_row, pose in pairs
+        ):
+            return None
+        return replace(self, columns=columns, part_of=part_of, machine_columns=machine_columns)
 
 
 def pose_table(datasets: Sequence[FitData], parameters: Parameters) -> PoseTable:

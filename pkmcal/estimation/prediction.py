@@ -76,15 +76,20 @@ class Prediction:
     effects: tuple[tuple[EffectOfRows, ...], ...]
 
     @classmethod
-    def of(cls, datasets: Sequence[FitData], parameters: Parameters) -> Prediction:
-        """Make the prediction of the rows to be fitted or held out.
+    def of(
+        cls,
+        datasets: Sequence[FitData],
+        parameters: Parameters,
+        table: PoseTable | None = None,
+    ) -> Prediction:
+        """Make the prediction of the rows to be fitted or held out; `table` is theirs, if known.
 
         Raises
         ------
         ValueError
             An effect that has an argument of the name of another.
         """
-        table = pose_table(datasets, parameters)
+        table = pose_table(datasets, parameters) if table is None else table
         depend = [list(data.dependences()) for data in datasets]
         for own in depend:
             for name, several in Counter(each.argument for each in own).items():
