@@ -265,12 +265,11 @@ class Equations:
         if len(self.table.rows) <= _TOGETHER:
             predicted = self.prediction.at(states.pose, theta)
             cache["predicted"] = self.prediction, predicted
-            values = self.prediction.of_rows(predicted)
             residuals = self.prediction.residuals(predicted)
         else:
-            values, residuals = self.prediction.seen(states.pose, theta)
+            _, residuals = self.prediction.seen(states.pose, theta)
         begun = self._begun(near)
-        return Evaluation(theta, self.parameters, machines, states, values, residuals, begun, cache)
+        return Evaluation(theta, self.parameters, machines, states, residuals, begun, cache)
 
     def kept(self, evaluation: Evaluation) -> Evaluation:
         """An evaluation by other equations of the same rows, as by these."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.arrays import FloatArray, IntArray, held_once
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.parameters import Parameters
 from pkmcal.estimation.tensioned_poses import Cells, cells_of, check_cells
@@ -147,8 +147,8 @@ def pose_table(datasets: Sequence[FitData], parameters: Parameters) -> PoseTable
     return PoseTable(
         sets=sets,
         rows=rows,
-        set_of=np.repeat(np.arange(len(sets)), count),
-        count=np.concatenate(read),
+        set_of=held_once(np.repeat(np.arange(len(sets)), count)),
+        count=held_once(np.concatenate(read)),
         pose_of=tuple(place[: len(count)]),
         other_of=tuple(None if m.other is None else next(there) for m in sets),
         actuators=of_pose["actuators"],
@@ -159,7 +159,7 @@ def pose_table(datasets: Sequence[FitData], parameters: Parameters) -> PoseTable
         columns=columns,
         part_of=part_of,
         machine_columns=machine_columns,
-        machine_of_pose=machine[first],
+        machine_of_pose=held_once(machine[first]),
         command_of_pose=command_of_pose,
     )
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, IntArray, chained, lots
+from pkmcal.arrays import FloatArray, IntArray, chained, held_once, lots
 from pkmcal.effects.effect import EffectOfRows
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.fit_data import FitData
@@ -103,7 +103,7 @@ class Prediction:
             datasets=tuple(datasets),
             table=table,
             parameters=parameters,
-            given=tuple({each.argument: each.given for each in own} for own in depend),
+            given=tuple({each.argument: held_once(each.given) for each in own} for own in depend),
             numbers=tuple(numbers),
             columns=tuple(
                 {name: _columns(table.columns[part], own) for name, own in mine.items()}
@@ -369,6 +369,13 @@ class Prediction:
         """Predict the readings at an evaluation, which may know them."""
         known = self._known(evaluation)
         return self.at(evaluation.pose, evaluation.theta) if known is None else known
+
+    def values(self, evaluation: Evaluation) -> tuple[FloatArray, ...]:
+        """Return what is predicted of the rows (N, k) of each set at an evaluation."""
+        known = self._known(evaluation)
+        if known is not None:
+            return self.of_rows(known)
+        return self.seen(evaluation.pose, evaluation.theta)[0]
 
     def _of_some(
         self, i: int, rows: slice, evaluation: Evaluation, numbers: Mapping[str, FloatArray]
