@@ -106,7 +106,7 @@ class Prediction:
             given=tuple({each.argument: held_once(each.given) for each in own} for own in depend),
             numbers=tuple(numbers),
             columns=tuple(
-                {name: _columns(table.columns[part], own) for name, own in mine.items()}
+                {name: _columns(table.columns, part, own) for name, own in mine.items()}
                 for mine, part in zip(numbers, table.part_of, strict=True)
             ),
             effects=tuple(
@@ -213,10 +213,12 @@ class Prediction:
         require_derivatives(m.instrument, moved, estimated)
         return moved
 
-    def lots_of(self, i: int, evaluation: Evaluation) -> Iterator[tuple[slice, Predicted]]:
+    def lots_of(
+        self, i: int, evaluation: Evaluation, most: int = _LOT
+    ) -> Iterator[tuple[slice, Predicted]]:
         """Predict the readings of a set at an evaluation, lot by lot: rows, and these."""
         numbers = self.arguments_of(i, evaluation.theta)
-        for rows in lots(len(self.table.pose_of[i]), _LOT):
+        for rows in lots(len(self.table.pose_of[i]), most):
             yield rows, self._of_some(i, rows, evaluation, numbers)
 
     def seen(
@@ -500,9 +502,9 @@ class Prediction:
         return whole if np.array_equal(last[whole], count) else np.unique(whole)
 
 
-def _columns(of_rows: IntArray, numbers: IntArray) -> IntArray:
-    """The parameters (N, w) of numbers of rows (N, w) of which the parameters are (N, m)."""
-    return np.where(numbers == NONE, NONE, np.take_along_axis(of_rows, numbers, axis=1))
+def _columns(columns: IntArray, part: IntArray, numbers: IntArray) -> IntArray:
+    """The parameters (N, w) of numbers of rows (N, w), by those (P, m) of the part (N,) of each."""
+    return np.where(numbers == NONE, NONE, columns[part[:, None], numbers])
 
 
 def _collect(found: RowsOfSets, i: int, first: IntArray) -> None:
