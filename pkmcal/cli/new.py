@@ -20,7 +20,7 @@ from pkmcal.files.atomic import write_whole
 from pkmcal.files.toml_lines import Source
 from pkmcal.geometry import robot_file
 from pkmcal.geometry.limb_kinds import ALIASES, KINDS
-from pkmcal.geometry.model import CHAIN
+from pkmcal.geometry.limbs import CHAIN
 from pkmcal.loading import load_parallel
 from pkmcal.report.as_json import as_json
 

@@ -18,7 +18,7 @@ from pkmcal.exceptions import ArgumentError
 from pkmcal.files.atomic import write_whole
 from pkmcal.geometry.drivers import Driver
 from pkmcal.geometry.limb_kinds import KINDS
-from pkmcal.geometry.model import CHAIN
+from pkmcal.geometry.limbs import CHAIN
 from pkmcal.kinematics.robot import Robot, require_parallel
 
 _PLATFORM = {  # joints of the platform by pose map; none: it is free

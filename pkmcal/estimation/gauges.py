@@ -49,7 +49,7 @@ def gauges(
     robot = as_parallel(parameters.robot)
     if not unidentifiable.shape[1] or robot is None:
         return (), unidentifiable
-    if robot.model.chains is not None:  # whose numbers are errors of joints, not places of points
+    if not robot.model.closed_form:  # whose numbers are errors of joints, not places of points
         found, free = frame_motions(parameters, robot, unidentifiable)
         rest = np.linalg.svd(found, full_matrices=True)[0][:, found.shape[1] :]
         of_all = np.pad(np.insert(free, _SCALE, 0.0, axis=0), ((0, 1), (0, 0)))

@@ -21,7 +21,6 @@ from pkmcal.estimation.estimator import Estimator
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.pose_minima import in_least_minima, solved_in_least_minima, squares_of_poses
 from pkmcal.exceptions import ArgumentError
-from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.kinematics.calibratable import Calibratable, as_parallel
 from pkmcal.kinematics.robot import Robot
 from pkmcal.statistics.robust_scale import median_ratio
@@ -207,11 +206,11 @@ def listed_slack(cables: Sequence[SlackCable]) -> str:
 def _pulling(equations: Equations) -> BoolArray:
     """Mark closures of cables, (equations,)."""
     robot = as_parallel(equations.parameters.robot)
-    if robot is None or robot.model.chains is not None:
+    if robot is None or not any(limb.cable for limb in robot.model.limbs):
         return np.zeros(equations.machines.equations, dtype=bool)
     home = robot.inverse(robot.home)[None]
     slope = robot.machine.slopes(robot.slots, home)[0]
-    cables = np.array([KINDS[limb.kind].cable for limb in robot.model.limbs])
+    cables = np.array([limb.cable for limb in robot.model.limbs])
     of_limbs = _of_limbs(robot)
     pulling = [
         bool(cables[mine].all()) and abs(np.sign(slope[mine]).sum()) == mine.sum()
@@ -226,7 +225,7 @@ def _slopes(equations: Equations, evaluation: Evaluation) -> FloatArray:
 
     def slopes(machine: Calibratable, poses: IntArray) -> FloatArray:
         found, robot = np.ones((len(poses), len(actuators))), as_parallel(machine)
-        if robot is None or robot.model.chains is not None:
+        if robot is None or not robot.model.closed_form:
             return found
         slope = robot.machine.slopes(robot.slots, equations.table.actuators[poses])
         for k, a in enumerate(actuators):

@@ -113,8 +113,7 @@ def events(move: Sampled) -> list[Event]:
 
 
 def _names(move: Sampled) -> list[tuple[str, int | None]]:
-    chains = move.robot.model.chains
-    tail = chains is not None and chains.tail > 0
+    tail = move.robot.model.mechanism.tail > 0
     limbs = range(1, len(move.robot.model.limbs) + tail + 1)
     names: list[tuple[str, int | None]] = [
         (what, limb) for what in Feasibility.LIMITS for limb in limbs
