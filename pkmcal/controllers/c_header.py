@@ -37,7 +37,6 @@ _GROOVE = [SLOTS.index(slot) for slot in OWN_SLOTS]
 _NEARER, _TIE = 1e-12, 1e-15  # of turns that agree, as agreed_turn of csrc/inverse.h has them
 # rad, of sines: below it the multiples of the parts of π/2 that they take off are exact
 _MOST_ANGLE: dict[Number, float] = {"double": 1e5, "float": 6e3}
-_UNUSED_FRAME = np.zeros(9)
 
 
 def c_header(robot: Robot, path: str | PathLike[str], number: Number = "double") -> Loss | None:

@@ -11,7 +11,7 @@ from pkmcal.geometry import robot_file
 from pkmcal.loading import urdf_chain
 
 _TABLES = (".csv", ".tsv", ".txt", ".log", ".xlsx")
-_CONFIGURATIONS = (".cfg", ".g", ".gcode")
+CONFIGURATIONS = (".cfg", ".g", ".gcode")  # endings of a firmware's settings
 
 
 class Inputs:
@@ -40,7 +40,7 @@ class Inputs:
         suffix = Path(path).suffix.lower()
         if suffix in _TABLES:
             raise FileError(f"{path}: measurements, where a robot is needed: the robot comes first")
-        if suffix in _CONFIGURATIONS:
+        if suffix in CONFIGURATIONS:
             raise FileError(
                 f"{path}: a firmware's configuration, where a robot file is needed: pkmcal import"
                 " makes one of it"

@@ -16,6 +16,8 @@ from pkmcal.kinematics.robot import Robot
 
 FARTHEST = 1e5  # mm, rad; a reading beyond it is a mistake of who sent or typed it
 
+RESTS = 20  # looks at rest after which a move that has not arrived has ended elsewhere
+
 
 class DeviceError(Error):
     """A machine or an instrument does not answer, or refuses; says which and why."""

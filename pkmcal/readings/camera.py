@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike
 from pkmcal.arguments import word
 from pkmcal.arrays import FloatArray, IntArray, as_rows, first_of_equal
 from pkmcal.core import instruments, screws
+from pkmcal.core.poses import NOWHERE
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.csv_table import Table
 from pkmcal.readings import rows, twists
@@ -48,7 +49,6 @@ from pkmcal.readings.unknowns import PLACE, Dependence, Numbers, Start, always
 from pkmcal.readings.unknowns import Found as Starts
 
 Mount = Literal["base", "platform"]
-_NOWHERE = np.zeros(6)
 _NO_SIZE = np.zeros(1)
 
 
@@ -287,8 +287,8 @@ class Camera(Reading):
         self,
         at: At,
         lots: Lots,
-        tool: FloatArray = _NOWHERE,
-        tool_origin: FloatArray = _NOWHERE,
+        tool: FloatArray = NOWHERE,
+        tool_origin: FloatArray = NOWHERE,
         corner: FloatArray | None = None,
         lens: FloatArray | None = None,
         size: FloatArray = _NO_SIZE,
@@ -296,7 +296,7 @@ class Camera(Reading):
     ) -> Shared:
         """Return `predict` through the motion of each picture's board before the camera."""
         count = len(at.pose)
-        frame = _NOWHERE if at.frame is None else at.frame
+        frame = NOWHERE if at.frame is None else at.frame
         pose, origin, within = (
             np.ascontiguousarray(np.broadcast_to(each, (count, 6))[lots.first])
             for each in (at.pose, tool_origin, tool)

@@ -10,13 +10,12 @@ from pkmcal.arrays import FloatArray
 from pkmcal.core.chains import ChainMachine
 from pkmcal.core.library import MAPS, POSE, SLOTS
 from pkmcal.core.machine import Machine
-from pkmcal.core.poses import invert
+from pkmcal.core.poses import NOWHERE, invert
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.limbs import Cone
 from pkmcal.geometry.model import Model
 from pkmcal.kinematics.dexterity import dexterity
-from pkmcal.kinematics.frames import NOWHERE
 from pkmcal.kinematics.reading_units import reading_units
 from pkmcal.kinematics.robot import Robot
 from pkmcal.screw import from_pose
