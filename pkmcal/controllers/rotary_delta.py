@@ -58,7 +58,7 @@ class RotaryDelta:
 
     @property
     def across(self) -> float:
-        """How far from the middle arms and rods reach level with the shoulders, mm."""
+        """Distance from the middle that arms and rods reach level with the shoulders, mm."""
         return min(self.radius + min(self.cranks), min(self.rods) - self.radius)
 
     @property

@@ -110,7 +110,7 @@ class MachineExpansion:
     name: ClassVar[str] = "expansion"
 
     def dependences(self, measured: Measurements) -> Iterator[Dependence]:
-        """Return no coefficients: those of expansion are exact."""
+        """Return no coefficients to be found: those of expansion are given and exact."""
         return iter(())
 
     def of_rows(self, measured: Measurements) -> Growth:

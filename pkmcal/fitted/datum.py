@@ -191,7 +191,7 @@ def _still(twists: FloatArray, length: float, *frames: FloatArray) -> FloatArray
 
 
 def _basis(columns: FloatArray) -> FloatArray:
-    """Orthonormal columns of the same space."""
+    """Return orthonormal columns that span what the columns of a matrix span."""
     left, singular, _ = svd(columns)
     basis: FloatArray = left[:, singular > _OUTSIDE]
     return basis

@@ -62,12 +62,12 @@ class Chains:
 
     @property
     def apart(self) -> bool:
-        """Whether no passive joint is of several limbs and none behind the platform."""
+        """True if no passive joint is of several limbs and none behind the platform."""
         return not (self.layout.shared or self.tail)
 
     @property
     def loose(self) -> bool:
-        """Whether limbs hold each other by joints that they share."""
+        """True if limbs hold each other by joints that they share."""
         return self.layout.loose
 
     @property

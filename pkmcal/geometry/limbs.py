@@ -91,7 +91,7 @@ class Limb:
 
     @property
     def cable(self) -> bool:
-        """Whether it pulls and cannot push."""
+        """True if it pulls and cannot push."""
         return self.kind != CHAIN and KINDS[self.kind].cable
 
     @property

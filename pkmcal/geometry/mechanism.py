@@ -43,18 +43,18 @@ class Mechanism(Protocol):
 
     @property
     def closed_form(self) -> bool:
-        """Whether each limb is a driver and rows, and its numbers are places and lengths.
+        """True if each limb is a driver and rows, and its numbers are places and lengths.
 
         Otherwise passive joints are eliminated, and the numbers are errors of joints.
         """
 
     @property
     def apart(self) -> bool:
-        """Whether each limb moves the platform for itself: no joint is of several, none behind."""
+        """True if each limb moves the platform for itself: no joint is of several, none behind."""
 
     @property
     def loose(self) -> bool:
-        """Whether limbs hold each other by joints that they share."""
+        """True if limbs hold each other by joints that they share."""
 
     @property
     def tail(self) -> int:

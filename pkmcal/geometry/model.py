@@ -123,7 +123,7 @@ class Model:
 
     @property
     def closed_form(self) -> bool:
-        """Whether limbs are in closed form, and their numbers are places and lengths."""
+        """True if limbs are in closed form, and their numbers are places and lengths."""
         return self.mechanism.closed_form
 
     @property

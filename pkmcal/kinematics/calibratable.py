@@ -91,7 +91,7 @@ class Declarations(Protocol):
 
     @property
     def closed_form(self) -> bool:
-        """Whether limbs are in closed form, and their numbers are places and lengths."""
+        """True if limbs are in closed form, and their numbers are places and lengths."""
 
     @property
     def laws(self) -> tuple[Law | None, ...]:

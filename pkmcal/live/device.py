@@ -97,7 +97,7 @@ class Instrument(Protocol):
         """One reading (k,), mm and rad; NaN: nothing was seen. `wanted` says where and what."""
 
     def close(self) -> None:
-        """Free what was opened."""
+        """Close connections and files of the device."""
 
 
 def require_translations(robot: Robot, what: str) -> None:

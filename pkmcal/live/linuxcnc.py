@@ -73,7 +73,7 @@ class LinuxCNC:
             sleep(_PAUSE)
 
     def where(self) -> Where:
-        """Its coordinates, and its joints as they are."""
+        """Return the machine's coordinates and the positions of its joints."""
         place = self._numbers("abs_act_pos", max(self._axes) + 1)
         pose = np.full(6, np.nan)
         pose[self._axes] = place[self._axes]

@@ -280,7 +280,7 @@ class Camera(Reading):
         return self.shared(at, Lots(of, first), **numbers).of_rows()
 
     def lots(self, m: Measured) -> IntArray:
-        """Pictures."""
+        """Rows in lots, one for each picture."""
         return self._pictures(m)
 
     def shared(
@@ -519,7 +519,7 @@ class Camera(Reading):
         return rows.of_names(table, {"camera": self.camera_name, "board": self.board_name})
 
     def found_in(self, table: Table) -> list[str]:
-        """Columns u and v."""
+        """Return where pixels are found in a table: columns u and v."""
         return ["u, v"] if {"u", "v"} <= table.columns.keys() else []
 
     def names(self, table: Table) -> set[str]:

@@ -158,7 +158,7 @@ class Tilt(Orientation):
         _mounted(sets, found, _of_tilts)
 
     def found_in(self, table: Table) -> list[str]:
-        """Columns of the tilts."""
+        """Return where tilts are found in a table."""
         return Reading.found_in(self, table)
 
 
