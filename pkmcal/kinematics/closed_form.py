@@ -37,7 +37,7 @@ class ClosedForm:
             kind = KINDS[limb.kind]
             arm = slopes[:, i]
             if kind.driver.arm and kind.actuator_unit == "rad":
-                arm = arm * abs(float(robot.geometry[f"{kind.driver.arm}{i + 1}"]))
+                arm = arm * abs(float(robot.model.geometry[f"{kind.driver.arm}{i + 1}"]))
             least = np.minimum(least, np.abs(by_q[:, row, limb.actuator]) / arm)
             row += 1 + len(kind.all_rows(limb.couple > 0))
         return least
