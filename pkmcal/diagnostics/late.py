@@ -12,14 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.diagnostics.check import RARE
 from pkmcal.diagnostics.columns import of_rows
 from pkmcal.diagnostics.visits import visits_of
 from pkmcal.display import chance_text
 from pkmcal.fitted.solution import Solution
 from pkmcal.readings.predicted import Predicted
 from pkmcal.statistics.score_test import Columns, beside
-
-CHANCE = 1e-3  # below which readings are late
 
 
 @dataclass(frozen=True)
@@ -47,7 +46,7 @@ class Late:
     @property
     def found(self) -> bool:
         """True if readings and actuators are of different moments."""
-        return self.chance < CHANCE
+        return self.chance < RARE
 
     def __str__(self) -> str:
         odds = chance_text(self.chance)
@@ -85,7 +84,7 @@ def late(found: Solution) -> Late | None:
     ways = {leaving: each for leaving, each in tested.items() if each is not None}
     # shared errors make as much more likely: of what is likely without them nothing else is asked
     scores = {
-        leaving: each.score() for leaving, each in ways.items() if len(ways) * each.chance < CHANCE
+        leaving: each.score() for leaving, each in ways.items() if len(ways) * each.chance < RARE
     }
     known = {leaving: score for leaving, score in scores.items() if score is not None}
     if not known:

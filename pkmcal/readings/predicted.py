@@ -11,10 +11,10 @@ import numpy as np
 
 from pkmcal.arguments import kind
 from pkmcal.arrays import FloatArray, IntArray, chained
+from pkmcal.core.poses import NOWHERE
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.readings.measured import Measured
 
-NOWHERE = np.zeros(6)
 MOTION = 6  # numbers of the motion of a lot of rows: ω, then v
 
 

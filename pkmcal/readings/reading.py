@@ -85,7 +85,7 @@ def units_of(components: Components) -> tuple[str, ...]:
 
 @cache
 def families_by_unit(units: tuple[str, ...]) -> tuple[Family, ...]:
-    """Families of components that have the same of these units."""
+    """Group components by their units into families."""
     return tuple(
         Family(unit, tuple(k for k, each in enumerate(units) if each == unit))
         for unit in dict.fromkeys(units)
