@@ -23,6 +23,7 @@ _COLUMNS_AT_ONCE = 32  # of a factorisation
 _FEW_COLUMNS = 4  # of one with many columns
 _MET = 1e-6  # share of the largest residual below which a component is met exactly
 _KEYS = 4096  # of rows that are added up at once
+_DENSE = 2  # times as many numbers as there are of them, which are counted without a sort
 
 
 @dataclass(frozen=True, eq=False)
@@ -271,9 +272,11 @@ def numbered(*keys: IntArray) -> IntArray:
     combined = keys[0]
     for key in keys[1:]:
         combined = combined * (int(key.max()) + 1) + key
-    new = np.diff(combined, prepend=combined[:1])
-    if new.min(initial=0) >= 0:  # in order already: no sort of many
-        return np.cumsum(new != 0)
+    largest = int(combined.max(initial=0))
+    if largest < _DENSE * len(combined) and combined.min(initial=0) >= 0:
+        there = np.zeros(largest + 1, dtype=bool)  # no sort of many
+        there[combined] = True
+        return (np.cumsum(there) - 1)[combined]
     return np.unique(combined, return_inverse=True)[1].reshape(-1)
 
 
