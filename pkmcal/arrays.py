@@ -186,9 +186,10 @@ def chained(rows: FloatArray, matrices: FloatArray, place: IntArray) -> FloatArr
     """
     if len(place) == len(matrices) and (place == np.arange(len(place))).all():
         return rows @ matrices
-    starts = np.flatnonzero(np.diff(place, prepend=-1))
-    if len(starts) * _LONG >= len(rows):
+    changed = place[1:] != place[:-1]
+    if (np.count_nonzero(changed) + 1) * _LONG >= len(rows):
         return rows @ matrices[place]
+    starts = np.flatnonzero(np.append(True, changed))
     (_, k, w), m = rows.shape, matrices.shape[2]
     found = np.empty((len(rows), k, m))
     ends = [*starts[1:].tolist(), len(rows)]

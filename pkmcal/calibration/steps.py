@@ -116,11 +116,20 @@ def prepare(
     drawn = not isinstance(holdout, Measurements)
     if isinstance(holdout, Measurements):
         held = [as_fitted(machine, holdout, fitted, sessions=by_session)]
+        _require_apart(held, fitted)
     elif holdout is not None:
         pairs = [draw(data, holdout) for data in fitted]
         fitted, held = [kept for kept, _ in pairs], [(out, i) for i, (_, out) in enumerate(pairs)]
     rows = Rows(machine, given, fitted, held, drawn, missing).without(dropped)
     return replace(rows, fitted=[*rows.fitted, *known_distances(list(rows.fitted))])
+
+
+def _require_apart(held: Sequence[tuple[FitData, int]], fitted: Sequence[FitData]) -> None:
+    """Refuse rows to be held out that say what rows that are fitted say."""
+    for data, like in held:
+        m, other = data.measured, fitted[like].measured
+        if m.kind == other.kind and (reason := m.instrument.not_apart(m, other)):
+            raise ArgumentError(f"holdout: {reason}")
 
 
 def begin(rows: Rows, chosen: Parameters) -> Problem:

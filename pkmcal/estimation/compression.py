@@ -115,10 +115,11 @@ class RowsInLots:
         width, (rows, k) = self.equations.unknowns, whitening.read[i].shape
         values, columns = np.empty((rows, k)), np.empty((rows, k, width))
         for (mine, _), part in zip(self.parts, shared, strict=True):
-            values[mine] = part.values
-            columns[mine, :, :MOTION] = part.by_motion
+            at = slice(None) if len(mine) == rows else mine
+            values[at] = part.values
+            columns[at, :, :MOTION] = part.by_motion
             for name, place in self._places.items():
-                columns[mine, :, place] = part.own[name][:, :, self.own[name]]
+                columns[at, :, place] = part.own[name][:, :, self.own[name]]
         residual = measured.instrument.difference(measured.values, values)
         columns[:, :, -1] = residual
         white = whitening.whiten_alone(columns, i)

@@ -327,7 +327,8 @@ class Equations:
         p = self.parameters
         columns = self.table.machine_columns
         robots = [p.robot.with_values(p.values_at(theta, own)) for own in columns]
-        return replace(self.machines, robots=tuple(robots))
+        m = self.machines
+        return Machines(tuple(robots), m.rows, m.closures, m.state, m.shift)
 
     def _begun(self, near: Near) -> RowStates:
         if near is None:

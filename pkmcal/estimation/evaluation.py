@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TypedDict
 
 from pkmcal.arrays import FloatArray, Int32Array
@@ -78,9 +79,9 @@ class Evaluation:
     @property
     def onward(self) -> RowStates:
         """Start of a search for the poses from here; of failed rows, the start of this search."""
-        return self.states.chosen(self.status == 0, self.begun)
+        return self.states if self.ok else self.states.chosen(self.status == 0, self.begun)
 
-    @property
+    @cached_property
     def ok(self) -> bool:
         """True if the forward kinematics solved every row."""
         return not self.status.any()

@@ -197,7 +197,7 @@ class Parameters:
             for row in self._smooth[0] * self.scale
         ]
 
-    @property
+    @cached_property
     def _stated(self) -> IntArray:
         """Free parameters with a prior of their own."""
         return np.flatnonzero(np.isfinite(self.prior) & ~self.uncertain)
@@ -228,10 +228,12 @@ class Parameters:
         """The parameters that are of the geometry: the first ones."""
         return slice(0, int(np.count_nonzero(self.number_of < len(self.places))))
 
-    @property
+    @cached_property
     def motions(self) -> tuple[int, ...]:
         """The first parameter of each frame and each tool."""
         numbers = [at for (role, _), at in self.nuisance.items() if role in (FRAME, "tool")]
+        if not numbers:
+            return ()
         return tuple(np.flatnonzero(np.isin(self.number_of, numbers)).tolist())
 
     def columns_of(self, datasets: Sequence[FitData]) -> tuple[IntArray, tuple[IntArray, ...]]:

@@ -127,7 +127,7 @@ class Whitening:
 
     def whiten_alone(self, part: FloatArray, i: int) -> FloatArray:
         """Whiten all numbers (N, k, ...) of set `i` as they are stated, in their memory."""
-        self._whiten(part, i, slice(None), np.ones(len(self.white)))
+        self._as_stated(part, i, slice(None))
         return part
 
     def stacked(self, part: FloatArray, i: int, rows: slice) -> FloatArray:
@@ -139,6 +139,11 @@ class Whitening:
         return stacked
 
     def _whiten(self, part: FloatArray, i: int, rows: slice, noise: FloatArray) -> None:
+        self._as_stated(part, i, rows)
+        of_components = noise[self.groups[i]]
+        part /= of_components.reshape(-1, *(1,) * (part.ndim - 2))
+
+    def _as_stated(self, part: FloatArray, i: int, rows: slice) -> None:
         white = self.white[i][rows]
         if not self.complete:
             np.nan_to_num(part, copy=False, nan=0.0)
@@ -146,8 +151,6 @@ class Whitening:
             part[:] = np.einsum("nij,nj...->ni...", white, part)
         else:
             part *= white.reshape(*white.shape, *(1,) * (part.ndim - 2))
-        of_components = noise[self.groups[i]]
-        part /= of_components.reshape(-1, *(1,) * (part.ndim - 2))
 
     def unwhiten(self, whitened: FloatArray, noise: FloatArray) -> list[FloatArray]:
         """Invert `whitened` for vectors (M,): parts (N, k) of all sets, mm and rad.
