@@ -138,7 +138,8 @@ def _alike(found: Solution, coarse: Coarse) -> bool:
     """Return whether rounding errors go together: they do not average out then."""
     if not coarse.residual < DITHERED * coarse.floor:
         return False  # noise spreads the readings over several steps
-    start, end = (each.predicted[coarse.set] for each in (found.fit.start, found.fit.end))
+    values, fit = found.fit.equations.prediction.values, found.fit
+    start, end = (values(each)[coarse.set] for each in (fit.start, fit.end))
     changed = (end - start)[:, coarse.component]
     if float(np.std(changed[np.isfinite(changed)])) < _SIGNAL * coarse.step:
         return True

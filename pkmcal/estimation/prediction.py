@@ -217,7 +217,7 @@ class Prediction:
         self, i: int, evaluation: Evaluation, most: int = _LOT
     ) -> Iterator[tuple[slice, Predicted]]:
         """Predict the readings of a set at an evaluation, lot by lot: rows, and these."""
-        numbers = self.arguments_of(i, evaluation.theta)
+        numbers = self._arguments(i, evaluation)
         for rows in lots(len(self.table.pose_of[i]), most):
             yield rows, self._of_some(i, rows, evaluation, numbers)
 
@@ -281,13 +281,14 @@ class Prediction:
         mine = {name: each[rows] for name, each in given.items() if name not in of_effects}
         first_row, last_row, _ = rows.indices(len(self.table.pose_of[i]))
         frames = [
-            (first, own[slice(*np.searchsorted(own, [first_row, last_row]))] - first_row)
+            (first, of_sets[i][slice(*np.searchsorted(of_sets[i], [first_row, last_row]))])
             for first, of_sets in self.frames.items()
-            if (own := of_sets.get(i)) is not None
+            if i in of_sets
         ]
         if not frames:
             yield at, mine, np.arange(len(at.pose))
-        for first, some in frames:
+        for first, in_set in frames:
+            some = in_set - first_row
             if not len(some) and len(at.pose):
                 continue
             every = len(some) == len(at.pose)
@@ -388,6 +389,10 @@ class Prediction:
             return known[i].some(rows)
         return self._predicted(i, rows, evaluation.pose, evaluation.theta, numbers)
 
+    def _arguments(self, i: int, evaluation: Evaluation) -> dict[str, FloatArray]:
+        """Return what `_of_some` needs: `arguments_of` a set, unless its readings are known."""
+        return {} if self._known(evaluation) else self.arguments_of(i, evaluation.theta)
+
     def _known(self, evaluation: Evaluation) -> tuple[Predicted, ...] | None:
         """Return what the evaluation knows of the predicted readings."""
         owner, known = evaluation.cache.get("predicted", (None, ()))
@@ -406,7 +411,7 @@ class Prediction:
             yield slice(0, len(self.table.rows)), known
             return
         count, place = len(self.table.rows), np.full(len(evaluation.pose), NONE)
-        numbers = [self.arguments_of(i, evaluation.theta) for i in range(len(self.table.sets))]
+        numbers = [self._arguments(i, evaluation) for i in range(len(self.table.sets))]
         at_once = bool(evaluation.machines.unknowns)
         for lot in lots(count, count if at_once else _LOT):
             seen = {
