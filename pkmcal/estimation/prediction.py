@@ -292,10 +292,10 @@ class Prediction:
             if not len(some) and len(at.pose):
                 continue
             every = len(some) == len(at.pose)
-            own = mine if every else {name: number[some] for name, number in mine.items()}
+            numbers_here = mine if every else {name: each[some] for name, each in mine.items()}
             frame, origin = theta[first : first + 6], self.parameters.origin[first]
             place = at.pose if every else at.pose[some]
-            yield replace(at, pose=place, frame=frame, origin=origin), own, some
+            yield replace(at, pose=place, frame=frame, origin=origin), numbers_here, some
 
     def _moved(
         self,
