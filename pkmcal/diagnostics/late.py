@@ -20,6 +20,8 @@ from pkmcal.fitted.solution import Solution
 from pkmcal.readings.predicted import Predicted
 from pkmcal.statistics.score_test import Columns, beside
 
+_MOST = 2.0  # ways: rows that are late by more are tried as whole rows
+
 
 @dataclass(frozen=True)
 class Late:

@@ -261,8 +261,8 @@ def _misfit(found: Identification, stated: Statement) -> list[Contribution]:
             "repeatability and lack of fit",
             _beyond(float(np.sqrt(known.mean())), noise),
             dof=max(sure.fit.freedom, 0.0) or float("inf"),
-            remark=f"residuals, {_of_noise(noise, stated)}; only repeated poses would tell repeatability"
-            " from lack of fit",
+            remark=f"residuals, {_of_noise(noise, stated)}; only repeated poses would tell"
+            " repeatability from lack of fit",
         )
     ]
 

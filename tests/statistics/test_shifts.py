@@ -110,7 +110,7 @@ def of_a_kind(true: FloatArray, rng: np.random.Generator) -> list[Shift]:
 
 
 def test_all_that_shifted_of_a_kind_are_named_each_with_its_own_size() -> None:
-    """Also where a shift of all alike explains a part of each: sizes are whole, not what is left."""
+    """Also where a shift of all alike explains a part of each: sizes are whole."""
     rng, off, missed = np.random.default_rng(6), [], 0
     for _ in range(40):
         true = np.zeros(6)
