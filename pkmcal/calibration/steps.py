@@ -145,9 +145,9 @@ def begin(rows: Rows, chosen: Parameters) -> Problem:
 def _require_predictions(problem: Problem) -> None:
     """Refuse a reading, or an effect, that gives no number where the machine is known to be."""
     table, start = problem.exact.table, problem.start
-    for m, place, predicted in zip(table.sets, table.pose_of, start.predicted, strict=True):
-        read = np.isfinite(m.values.reshape(predicted.shape))
-        silent = (read & ~np.isfinite(predicted)).any(axis=1) & (start.status[place] == 0)
+    for m, place, off in zip(table.sets, table.pose_of, start.residuals, strict=True):
+        read = np.isfinite(m.values.reshape(off.shape))
+        silent = (read & ~np.isfinite(off)).any(axis=1) & (start.status[place] == 0)
         if silent.any():
             raise ArgumentError(
                 f"measurements: {m.kind}: nothing finite is predicted of row"

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray, IntArray, lots
+from pkmcal.arrays import BoolArray, FloatArray, IntArray, held_once, lots
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.readings import orientation
 
@@ -48,7 +48,7 @@ class Whitening:
         """Whitening by the sigma of the sets, on a machine of this length in mm."""
         every = np.arange(len(sets))
         return cls(
-            tuple(_whitening(m, length) for m in sets),
+            tuple(held_once(_whitening(m, length)) for m in sets),
             tuple(np.isfinite(m.values).reshape(len(m), -1) for m in sets),
             tuple(np.ones(len(m.components)) for m in sets),
             tuple(np.full(len(m.components), i) for i, m in enumerate(sets)),
@@ -101,7 +101,7 @@ class Whitening:
 
     def reweighted(self, deviations: Sequence[FloatArray]) -> Whitening:
         """Give the components (k,) of each set other relative deviations."""
-        white = [each / by for each, by in zip(self.white, deviations, strict=True)]
+        white = [held_once(each / by) for each, by in zip(self.white, deviations, strict=True)]
         return replace(self, white=tuple(white), deviations=tuple(deviations))
 
     def whitened(self, parts: Sequence[FloatArray], noise: FloatArray) -> FloatArray:
@@ -186,7 +186,8 @@ def _whitening(measured: Measurements, length: float) -> FloatArray:
     """Factors (N, k) or matrices (N, k, k) that make the noise one; 1 mm where it is not known."""
     sigma = measured.sigma
     if sigma is None:
-        return np.tile(measured.instrument.mm(measured, length), (len(measured), 1))
+        mm = measured.instrument.mm(measured, length)
+        return np.tile(mm, (len(measured), 1))
     first = measured.instrument.turning
     if first is not None and not _same_turnings(sigma, first):
         sigma = orientation.covariance(sigma, np.nan_to_num(measured.values[:, first:]))
