@@ -49,7 +49,7 @@ class FitData:
     effects: tuple[Effect, ...] = ()
 
     def select(self, chosen: IntArray | BoolArray) -> FitData:
-        """Some of the rows."""
+        """Return the data of some of the rows."""
         return replace(self, measured=self.measured.select(chosen), rows=self.rows[chosen])
 
     @property
@@ -66,7 +66,7 @@ class FitData:
     @property
     def axis(self) -> IntArray | None:
         """The artefact's own axis in each row, (N,), of touched lines and planes."""
-        touched = self.measured.touched
+        touched = getattr(self.measured.instrument, "touched", None)
         if touched is None:
             return None
         return np.array([self.starts["touch", name].axis for name in touched.tolist()])
