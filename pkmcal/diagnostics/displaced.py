@@ -152,7 +152,7 @@ def _columns(fit: Fit, mine: list[BoolArray]) -> Columns:
 
     def change(i: int, rows: slice, seen: Predicted) -> FloatArray:
         if "target" not in seen.by:
-            return np.zeros((*seen.values[rows].shape, 3))
-        return np.where(mine[i][rows, None, None], seen.by["target"][rows], 0.0)
+            return np.zeros((*seen.values.shape, 3))
+        return np.where(mine[i][rows, None, None], seen.by["target"], 0.0)
 
     return of_rows(fit, change)

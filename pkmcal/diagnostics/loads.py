@@ -73,7 +73,7 @@ def _by_compliances(fit: Fit, robot: Calibratable) -> Columns:
         place, load = table.pose_of[i][rows], table.sets[i].load
         carrying = soft if load is None else soft.under(Load.of_rows(load[rows]))
         twists = carrying.error_twists(fit.end.pose[place], table.actuators[place])
-        moved: FloatArray = seen.by_twist[rows] @ twists[..., places]
+        moved: FloatArray = seen.by_twist @ twists[..., places]
         return moved
 
     return of_rows(fit, change)

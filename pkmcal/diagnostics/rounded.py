@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, lots
+from pkmcal.arrays import FloatArray
 from pkmcal.diagnostics.check import Check, Level, Remedy
 from pkmcal.display import displayed
 from pkmcal.estimation.coarse_readings import DITHERED, Coarse
@@ -81,14 +81,14 @@ def _reach_of_actuators(found: Solution, at: Evaluation) -> list[FloatArray]:
     read = equations.table.actuators
     half = np.array([0.5 * step_of(read[:, a], unit) for a, unit in enumerate(units)])
     table, reach = equations.table, []
-    for i, seen in enumerate(equations.prediction.predicted(at)):
-        whole, other = np.empty(seen.values.shape), table.other_of[i]
-        for rows in lots(len(whole)):
+    for i, residual in enumerate(at.residuals):
+        whole, other = np.empty(residual.shape), table.other_of[i]
+        for rows, seen in equations.prediction.lots_of(i, at):
             twists = at.machines.actuator_twists(at.states, table.pose_of[i][rows])
-            whole[rows] = np.abs(seen.by_twist[rows] @ twists) @ half
+            whole[rows] = np.abs(seen.by_twist @ twists) @ half
             if other is not None and seen.by_other is not None:
                 twists = at.machines.actuator_twists(at.states, other[rows])
-                whole[rows] += np.abs(seen.by_other[rows] @ twists) @ half
+                whole[rows] += np.abs(seen.by_other @ twists) @ half
         reach.append(whole)
     return reach
 
@@ -138,7 +138,8 @@ def _alike(found: Solution, coarse: Coarse) -> bool:
     """Return whether rounding errors go together: they do not average out then."""
     if not coarse.residual < DITHERED * coarse.floor:
         return False  # noise spreads the readings over several steps
-    start, end = (each.predicted[coarse.set] for each in (found.fit.start, found.fit.end))
+    values, fit = found.fit.equations.prediction.values, found.fit
+    start, end = (values(each)[coarse.set] for each in (fit.start, fit.end))
     changed = (end - start)[:, coarse.component]
     if float(np.std(changed[np.isfinite(changed)])) < _SIGNAL * coarse.step:
         return True

@@ -52,13 +52,20 @@ class Coarse:
 
 
 def coarse_readings(
-    equations: Equations, named: Labels, fit: LinearFit, factors: FloatArray, covariance: Covariance
+    equations: Equations,
+    named: Labels,
+    component: IntArray,
+    fit: LinearFit,
+    factors: FloatArray,
+    covariance: Covariance,
 ) -> tuple[Coarse, ...]:
-    """Find them, for noise factors (G,); none of mixtures of readings and closures."""
+    """Find them, for noise factors (G,); none of mixtures of readings and closures.
+
+    `component` (M,) is `component_of` the equations.
+    """
     if equations.machines.unknowns:
         return ()
     variances = equations.whitening.variances(factors)
-    component = component_of(equations)
     found = []
     for i, measured in enumerate(equations.table.sets):
         values = measured.values.reshape(len(measured), -1)

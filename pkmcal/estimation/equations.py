@@ -203,6 +203,14 @@ class Equations:
             return self
         return replace(self, prediction=replace(self.prediction, parameters=parameters))
 
+    def with_more(self, datasets: Sequence[FitData], parameters: Parameters) -> Equations:
+        """The equations of the same rows by further parameters, weighted as these are."""
+        table = self.table.with_parameters(datasets, parameters)
+        if table is not None:
+            return replace(self, prediction=Prediction.of(datasets, parameters, table), whole=None)
+        equations = Equations.of(datasets, parameters).reweighted(self.whitening.deviations)
+        return replace(equations, blocks=self.blocks)  # slack cables count in neither
+
     def with_tension(self, tension: FloatArray | None) -> Equations:
         """The equations under tensions (K, n) of what the actuators drive; None: as they are."""
         if tension is None:
@@ -254,19 +262,14 @@ class Equations:
             factors = np.ones(len(self.blocks.unstated)) if noise is None else noise
             states, system = self.system.best(machines, states, theta, factors)
             cache["system"] = self.system, factors, system
-        predicted = self.prediction.at(states.pose, theta)
         if len(self.table.rows) <= _TOGETHER:
+            predicted = self.prediction.at(states.pose, theta)
             cache["predicted"] = self.prediction, predicted
-        return Evaluation(
-            theta,
-            self.parameters,
-            machines,
-            states,
-            self.prediction.of_rows(predicted),
-            self.prediction.residuals(predicted),
-            self._begun(near),
-            cache,
-        )
+            residuals = self.prediction.residuals(predicted)
+        else:
+            _, residuals = self.prediction.seen(states.pose, theta)
+        begun = self._begun(near)
+        return Evaluation(theta, self.parameters, machines, states, residuals, begun, cache)
 
     def kept(self, evaluation: Evaluation) -> Evaluation:
         """An evaluation by other equations of the same rows, as by these."""
@@ -324,7 +327,8 @@ class Equations:
         p = self.parameters
         columns = self.table.machine_columns
         robots = [p.robot.with_values(p.values_at(theta, own)) for own in columns]
-        return replace(self.machines, robots=tuple(robots))
+        m = self.machines
+        return Machines(tuple(robots), m.rows, m.closures, m.state, m.shift)
 
     def _begun(self, near: Near) -> RowStates:
         if near is None:

@@ -13,8 +13,10 @@ from pkmcal.estimation.estimate import LEAST_NOISE, Estimate, IterationState
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.identifiability import (
     Decomposed,
+    Measured,
     decompose,
     directions,
+    measured,
 )
 from pkmcal.estimation.least_squares import Search, SingularError, Trail
 from pkmcal.estimation.loss import Loss, LossName
@@ -251,16 +253,20 @@ class Estimator:
         kept, noise_known = worst, fitted or not self.unstated.any() or worst < size
         worst = worst if noise_known else np.inf
         first, factor = self._at_start(noise, None if last is None else last.state, known)
-        now: tuple[Decomposed | None, Decomposed | None] = (None, None)
+        now: tuple[Measured | None, Measured | None] = (None, None)
         if fitted and last is not None:
             known = last.state.noise, last.triangle
-            now = self._decomposed(last.evaluation, self._triangle(last.evaluation, noise, known))
-        measured = directions(first[0], now[0], size)
+            data, whole = self._parts(
+                last.evaluation, self._triangle(last.evaluation, noise, known)
+            )
+            alone = measured(*data)
+            now = alone, alone if whole is data else measured(*whole)
+        by_data = directions(first[0], now[0], size)
         determined = directions(first[1], now[1], size)
         wanted = directions(first[1], now[1], size, worst)
         freedom = None if last is None else last.state.first_freedom
         return IterationState(
-            noise, loss, measured, determined, wanted, kept, first, factor, freedom
+            noise, loss, by_data, determined, wanted, kept, first, factor, freedom
         )
 
     def _at_start(
@@ -277,21 +283,23 @@ class Estimator:
         factor = self._triangle(self.start, noise, known)
         grown = None if last is None else common(noise / last.noise)
         if last is None or grown is None or self._priors:
-            return self._decomposed(self.start, factor), factor
+            data, whole = self._parts(self.start, factor)
+            alone = decompose(*data)
+            return (alone, alone if whole is data else decompose(*whole)), factor
         singular, basis = last.at_start[0]
         return ((singular / grown, basis),) * 2, factor
 
-    def _decomposed(
+    def _parts(
         self, evaluation: Evaluation, factor: FloatArray
-    ) -> tuple[Decomposed, Decomposed]:
-        """Decompose R without and with the prior."""
+    ) -> tuple[tuple[FloatArray, ...], tuple[FloatArray, ...]]:
+        """R, in parts below each other, without and with the prior; without one the same object."""
+        data: tuple[FloatArray, ...] = (factor,)
         if not self._priors:
-            data = decompose(factor)
             return data, data
         prior, chosen = self.search.prior(evaluation.theta), self.equations.parameters
-        # what is fixed but for an uncertainty is known to measurements without a prior, too
-        stated = [prior[chosen.prior_of_uncertain]] if len(chosen.spread) else []
-        return decompose(factor, *stated), decompose(factor, prior)
+        if len(chosen.spread):  # what is fixed but for that is known without a prior, too
+            data = factor, prior[chosen.prior_of_uncertain]
+        return data, (factor, prior)
 
     def _triangle(
         self, evaluation: Evaluation, noise: FloatArray, known: Known | None

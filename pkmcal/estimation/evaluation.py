@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TypedDict
 
 from pkmcal.arrays import FloatArray, Int32Array
@@ -41,8 +42,6 @@ class Evaluation:
         With their geometry.
     states : RowStates
         Where the machine is at each distinct row of actuators; NaN where it cannot be.
-    predicted : tuple of ndarray (N, k)
-        What the instruments show there, of each set of measurements.
     residuals : tuple of ndarray (N, k)
         Measured less predicted of each set, mm and rad.
     begun : RowStates
@@ -55,7 +54,6 @@ class Evaluation:
     parameters: Parameters
     machines: Machines
     states: RowStates
-    predicted: tuple[FloatArray, ...]
     residuals: tuple[FloatArray, ...]
     begun: RowStates
     cache: Cache = field(default_factory=Cache, repr=False)
@@ -81,9 +79,9 @@ class Evaluation:
     @property
     def onward(self) -> RowStates:
         """Start of a search for the poses from here; of failed rows, the start of this search."""
-        return self.states.chosen(self.status == 0, self.begun)
+        return self.states if self.ok else self.states.chosen(self.status == 0, self.begun)
 
-    @property
+    @cached_property
     def ok(self) -> bool:
         """True if the forward kinematics solved every row."""
         return not self.status.any()

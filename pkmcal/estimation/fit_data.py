@@ -66,7 +66,7 @@ class FitData:
     @property
     def axis(self) -> IntArray | None:
         """The artefact's own axis in each row, (N,), of touched lines and planes."""
-        touched = self.measured.touched
+        touched = getattr(self.measured.instrument, "touched", None)
         if touched is None:
             return None
         return np.array([self.starts["touch", name].axis for name in touched.tolist()])

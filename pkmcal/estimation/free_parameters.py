@@ -78,7 +78,7 @@ def parameters(
     fitted_along |= beside_known
     number_of = np.array([number for number, _ in entries], dtype=np.intp)
     names = tuple(numbers[j] + (f"@{behind}" if behind else "") for j, behind in entries)
-    uncertain = np.isin(number_of, sorted(fitted_along))
+    uncertain = np.array([number in fitted_along for number, _ in entries], dtype=bool)
     units_of = geometry.units
     every = [units_of[i] for i in places.tolist()]
     every += [unit for each in beside.values() for unit in each.units]
@@ -127,8 +127,9 @@ def parameters(
         uncertain=uncertain,
         spread=of_uncertain,
     )
-    made = replace(made, origin={first: np.zeros(6) for first in made.motions})
-    if like is None:
+    if made.motions:
+        made = replace(made, origin={first: np.zeros(6) for first in made.motions})
+    if like is None and asked.residuals:
         made = replace(made, residuals=asked.residuals)
         _require_dependence(made)
     if not isinstance(asked.prior, Mapping):

@@ -69,7 +69,8 @@ class Trail:
         """The trail with another step; poses follow the parameters from there."""
         if self.near is not step:
             self.near.cache.pop("following", None)
-        return replace(self, near=step, history=(*self.history, misfit))
+        history, count = (*self.history, misfit), self.evaluations
+        return Trail(step, self.u, self.noise, self.here, count, self.converged, history)
 
 
 class Search:
@@ -118,8 +119,8 @@ class Search:
         there = self.equations.at(self._theta(u), noise, trail.near)
         if there.ok:  # what it began with is needed of rows that failed alone, and takes memory
             there = replace(there, begun=there.states)
-        count = trail.evaluations + 1
-        return replace(trail, u=u.copy(), noise=noise, here=there, evaluations=count)
+        count, near, history = trail.evaluations + 1, trail.near, trail.history
+        return Trail(near, u.copy(), noise, there, count, trail.converged, history)
 
     def prior(self, theta: FloatArray) -> FloatArray:
         """A row (p, n) for each prior at all parameters `theta`, in units of its deviation."""
@@ -182,8 +183,7 @@ class Search:
         self._cache.clear()
         for evaluation in (self.start, trail.near, trail.here):
             evaluation.cache.pop("following", None)
-            if evaluation is not trail.here:  # of which they are asked for once more
-                evaluation.cache.pop("derivatives", None)
+            evaluation.cache.pop("derivatives", None)
 
     def _batches(self, evaluation: Evaluation, noise: FloatArray) -> Iterator[Batch]:
         """`own_jacobian` in batches, finite or not."""

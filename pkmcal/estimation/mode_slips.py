@@ -69,7 +69,7 @@ def _better(equations: Equations, evaluation: Evaluation) -> tuple[IntArray, Flo
     if as_parallel(evaluation.robot) is None:
         return none  # an arm has one pose
     prediction = equations.prediction
-    misfit = worst_readings(equations, prediction.predicted(evaluation))
+    misfit = worst_readings(equations, evaluation.residuals)
     solved, read = np.isfinite(misfit), ~np.isnan(misfit)
     if not solved.any():
         return none
@@ -92,7 +92,7 @@ def _better(equations: Equations, evaluation: Evaluation) -> tuple[IntArray, Flo
         trial = pose.copy()
         for k, of_row in zip(gross, modes, strict=True):
             trial[k] = of_row[j] if j < len(of_row) else np.nan
-        now = worst_readings(equations, prediction.at(trial, evaluation.theta))
+        now = worst_readings(equations, prediction.seen(trial, evaluation.theta)[1])
         nearer = now < least
         least, best = np.where(nearer, now, least), np.where(nearer[:, None], trial, best)
     fits = (least < _HALF * np.where(solved, misfit, np.inf)) & (least <= _FITTING * limit)

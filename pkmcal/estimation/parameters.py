@@ -13,7 +13,7 @@ from typing import Literal
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray, IntArray
+from pkmcal.arrays import BoolArray, FloatArray, IntArray, held_once
 from pkmcal.core.poses import compose, compose_rates
 from pkmcal.estimation.fit_data import FRAME, Dependence, FitData
 from pkmcal.estimation.own_residuals import Residual, at_parameters, residual_name
@@ -197,7 +197,7 @@ class Parameters:
             for row in self._smooth[0] * self.scale
         ]
 
-    @property
+    @cached_property
     def _stated(self) -> IntArray:
         """Free parameters with a prior of their own."""
         return np.flatnonzero(np.isfinite(self.prior) & ~self.uncertain)
@@ -228,10 +228,12 @@ class Parameters:
         """The parameters that are of the geometry: the first ones."""
         return slice(0, int(np.count_nonzero(self.number_of < len(self.places))))
 
-    @property
+    @cached_property
     def motions(self) -> tuple[int, ...]:
         """The first parameter of each frame and each tool."""
         numbers = [at for (role, _), at in self.nuisance.items() if role in (FRAME, "tool")]
+        if not numbers:
+            return ()
         return tuple(np.flatnonzero(np.isin(self.number_of, numbers)).tolist())
 
     def columns_of(self, datasets: Sequence[FitData]) -> tuple[IntArray, tuple[IntArray, ...]]:
@@ -249,7 +251,7 @@ class Parameters:
             if session is not None:
                 names, mine = (each.tolist() for each in np.unique(session, return_inverse=True))
             parts = [place.setdefault((name, behind), len(place)) for name in names]
-            part_of.append(np.array(parts, dtype=np.intp)[mine])
+            part_of.append(held_once(np.array(parts, dtype=np.intp)[mine]))
         columns = np.array([
             [
                 self.column.get((number, label(scope, *part)), NONE)

@@ -174,8 +174,11 @@ class Machines:
         Of distinct poses, all where they have unknowns: those of each machine, and their twists
         (b, 6, g). Nothing where it does not move.
         """
+        alone = len(self.rows) == 1
         for each, robot, rows in zip(self.closures, self.robots, self.rows, strict=True):
-            own = poses[rows.take(np.searchsorted(rows, poses), mode="clip") == poses]
+            own = poses
+            if not alone:
+                own = poses[rows.take(np.searchsorted(rows, poses), mode="clip") == poses]
             driven = _driven(robot, self.state.at(own))
             found = each.twists_by_numbers(driven, _some(states, own), places)
             if found is not None:

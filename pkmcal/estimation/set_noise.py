@@ -26,7 +26,7 @@ def slipped(estimator: Estimator, estimate: Estimate) -> FloatArray:
     """
     equations = estimator.equations
     ratios = np.ones(len(equations.table.sets))
-    if equations.machines.unknowns or estimator.loss != "linear":
+    if len(ratios) == 1 or equations.machines.unknowns or estimator.loss != "linear":
         return ratios
     squares, freedom = (part[: len(ratios)] for part in estimate.shares[:2])
     unstated = estimator.unstated[: len(ratios)]

@@ -43,7 +43,8 @@ def uncertain_names(
     for pattern in stated.patterns:
         if of_geometry(pattern, geometry.names):
             found.update(geometry.match(pattern, "uncertainty"))
-    names = [name for name in geometry.names if name in found - set(others)]
+    found -= {*others}
+    names = [name for name in geometry.names if name in found]
     sigma = np.sqrt(np.diagonal(spread(stated, names)))
     return [name for name, own in zip(names, sigma, strict=True) if own > 0.0]
 

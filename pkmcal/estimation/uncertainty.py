@@ -391,9 +391,10 @@ def uncertainty(
     beyond = prior_residual(estimator, estimate)
     refuted = not estimator.unstated.any() and np.isfinite(found.scale_freedom)
     refuted = refuted and rule == "auto" and not equations.machines.unknowns
-    if refuted and _of_own_deviations(fit, beyond, named, component_of(equations))[0] is not fit:
+    place = component_of(equations)
+    if refuted and _of_own_deviations(fit, beyond, named, place)[0] is not fit:
         found = replace(found, rule="cluster")  # sigma is wrong of some components alone
-    coarse = coarse_readings(equations, named, fit, state.noise, found)
+    coarse = coarse_readings(equations, named, place, fit, state.noise, found)
     widening = max((each.widening for each in coarse), default=1.0)
     return Uncertainty(
         labels=named,

@@ -39,11 +39,10 @@ def distances(off: FloatArray, outliers: BoolArray) -> Distances:
     reached = np.isfinite(off)
     if not reached.any():
         return Distances()
-    here = off[reached]
-    median, high = np.quantile(here, [0.5, 0.95]).tolist()
-    return Distances(
-        rms(here),
-        median,
-        high,
-        rms(off[reached & ~outliers]),
-    )
+    median, high = np.quantile(off[reached], [0.5, 0.95]).tolist()
+    return Distances(rms_reached(off), median, high, rms(off[reached & ~outliers]))
+
+
+def rms_reached(off: FloatArray) -> float:
+    """Root mean square of the distances (N,) of points that were reached; NaN without any."""
+    return rms(off[np.isfinite(off)])

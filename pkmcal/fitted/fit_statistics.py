@@ -15,12 +15,11 @@ from pkmcal.estimation.gauges import gauges
 from pkmcal.estimation.identifiability import (
     as_sum,
     held_errors,
-    observability,
     sparse_basis,
 )
 from pkmcal.estimation.mirror import MIRROR, mirror_fits
 from pkmcal.estimation.uncertainty import Uncertainty
-from pkmcal.fitted.distances import distances
+from pkmcal.fitted.distances import rms_reached
 from pkmcal.fitted.dropped import outlying
 from pkmcal.fitted.nuisances import CHECKED, in_result, nuisances
 from pkmcal.statistics.distributions import t_factor
@@ -51,7 +50,8 @@ def parameter_table(
     at_bound = np.zeros(len(chosen), dtype=bool)
     for bound in chosen.bounds:
         at_bound |= np.isclose(theta, bound, rtol=1e-9, atol=1e-9)
-    beside = nuisances(chosen, theta, values, rates @ estimate.covariance @ rates.T)
+    by_design = rates @ estimate.covariance @ rates.T
+    beside = nuisances(chosen, theta, values, by_design)
     mine = np.flatnonzero(in_result(chosen, beside))
     known = np.isfinite(stderr[mine])
     return {
@@ -64,9 +64,7 @@ def parameter_table(
         "parameter_dof": freedom[mine],
         "interval95": np.column_stack([values - half, values + half])[mine],
         "covariance": shown[np.ix_(mine, mine)],
-        "correlation_matrix": _correlation(
-            (rates @ estimate.covariance @ rates.T)[np.ix_(mine, mine)], known
-        ),
+        "correlation_matrix": _correlation(by_design[np.ix_(mine, mine)], known),
         "nuisances": beside,
         "at_bounds": tuple(name for name, at in zip(chosen.names, at_bound, strict=True) if at),
         "covariance_rule": uncertainty.covariance.rule,
@@ -103,11 +101,6 @@ def identifiability(estimator: Estimator, estimate: Estimate, hidden: int) -> di
             for combination in open_ones
         ),
         "gauges": names,
-        "observability": observability(
-            estimator.scaled_triangle(estimate.evaluation),
-            len(equations.table.actuators),
-            measured.rank,
-        ),
     }
 
 
@@ -127,7 +120,6 @@ def misfit(
     dof = float(estimate.weights @ equations.blocks.components) + len(prior) - state.fitted.rank
     squares = np.repeat(estimate.weights, equations.blocks.components) @ estimate.residual**2
     stated = equations.sigma_stated and dof > 0
-    split = uncertainty.noises
     shown = np.where(estimator.unstated & ~uncertainty.unknown, state.noise, np.nan)
     deviations = equations.whitening.deviations
     sets = equations.table.sets
@@ -140,10 +132,10 @@ def misfit(
         for m, arc in zip(sets, arcs, strict=True)
     )
     named = outlying(estimator, estimate)
-    before, after = (distances(misfits.distances(equations, each), named) for each in (start, end))
+    before, after = (rms_reached(misfits.distances(equations, each)) for each in (start, end))
     return {
-        "rms": after.rms,
-        "rms_before": before.rms,
+        "rms": after,
+        "rms_before": before,
         "closure_rms": misfits.closure_rms(equations, estimate.evaluation),
         "closure_rms_before": misfits.closure_rms(equations, estimator.start),
         "closures": misfits.worst_closures(equations, estimate.evaluation),
@@ -159,13 +151,9 @@ def misfit(
         "components": tuple(m.components for m in sets),
         "component_units": tuple(m.units for m in sets),
         "told_apart": any((relative != 1.0).any() for relative in deviations),
-        "reading_noise": tuple(float(np.sqrt(total - shared)) for total, shared in split),
-        "pose_noise": tuple(float(np.sqrt(shared)) for _, shared in split),
         "residuals": end.residuals,
         "rows": equations.table.rows,
         "outliers": tuple(equations.table.rows[named].tolist()),
-        "distances_before": before,
-        "distances": after,
     }
 
 

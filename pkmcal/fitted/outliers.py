@@ -84,7 +84,12 @@ def outliers(
         spread = max(median_ratio(squares[kept], components[kept]), 1.0 if stated else _NONE)
         freedom = _freedom(squares, components, kept, LARGE if stated else 1)
         scale = _median(freedom) / (_median(components) * spread)
-        chance = _chance(squares * scale, freedom)
+        known = np.inf
+        if not stated:
+            known = _known(
+                components[kept], float(np.trace(covariance @ (normal - prior.T @ prior)))
+            )
+        chance = _chance(squares * scale, freedom, known)
         # where the chance is 0 to the last digit, the squares decide; they exceed its logarithm
         excess = np.where(chance > 0, -np.log(np.maximum(chance, _NONE)), squares)
         excess = np.where(kept, np.maximum(excess, 0.0), -1.0)
@@ -149,8 +154,26 @@ def _freedom(squares: FloatArray, components: IntArray, kept: BoolArray, least: 
     return found
 
 
-def _chance(squares: FloatArray, components: FloatArray) -> FloatArray:
-    from scipy.special import gammaincc
+def _known(components: IntArray, taken: float) -> float:
+    """Degrees of freedom of a variance by the median of rows with so many equations each.
 
-    chance: FloatArray = gammaincc(components / 2, squares / 2)
-    return chance
+    As many as make it scatter so; `taken` of the equations are met by the parameters.
+    """
+    from scipy.special import gammaln
+
+    usual, rows = float(np.median(components)), len(components)
+    half, median = usual / 2.0, float(_median(np.asarray(usual)))
+    density = np.exp((half - 1.0) * np.log(median / 2.0) - median / 2.0 - gammaln(half)) / 2.0
+    left = 1.0 - taken / float(components.sum())
+    return max(float(8.0 * rows * (density * median) ** 2 * left), 1.0)
+
+
+def _chance(squares: FloatArray, freedom: FloatArray, known: float) -> FloatArray:
+    """Chance of squares, over a variance that is known with so many degrees of freedom."""
+    from scipy.special import fdtrc, gammaincc
+
+    if np.isinf(known):
+        chance: FloatArray = gammaincc(freedom / 2, squares / 2)
+        return chance
+    estimated: FloatArray = fdtrc(freedom, known, squares / freedom)
+    return estimated

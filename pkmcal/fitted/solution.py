@@ -4,14 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Generic
+
+import numpy as np
 
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.effects.expansion import stated
+from pkmcal.estimation import misfits
+from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.fit_data import FitData
+from pkmcal.estimation.identifiability import observability
 from pkmcal.fitted.datum import NO_DATUM, Datum
-from pkmcal.fitted.distances import Distances
+from pkmcal.fitted.distances import Distances, distances
 from pkmcal.fitted.fit import Fit
 from pkmcal.fitted.holdout import HeldOut
 from pkmcal.fitted.nuisances import Nuisance
@@ -103,8 +109,6 @@ class Solution(HeldOut, Generic[Machine]):
         What readings of actuators alone leave open by their nature, in words.
 
         Where the base stands, the common scale; these combinations are not in `unidentifiable`.
-    observability : dict of str to float
-        Indices O1 … O5 of the scaled Jacobian, over the identifiable combinations.
     rms : float
         √(Σ r²/N) over the N fitted points, mm.
 
@@ -153,20 +157,12 @@ class Solution(HeldOut, Generic[Machine]):
         Unit of each: "mm", "rad", "px".
     told_apart : bool
         Whether components differ in their noise.
-    reading_noise : tuple of float
-        What a single reading of each set has of its own, mm per coordinate.
-    pose_noise : tuple of float
-        What rows of one pose share beside it, mm per coordinate: pose and model errors.
     residuals : tuple of ndarray
         Measured less predicted (N, k) of the fitted rows of each set, mm and rad.
     rows : ndarray of int
         Numbers of the fitted rows, counted through all sets from 0.
     outliers : tuple of int
         Rows that the others contradict, numbered likewise.
-    distances_before : Distances
-        Rms, median and 95 % quantile of the nominal machine's distances to fitted points, mm.
-    distances : Distances
-        Those of the calibrated machine, and its rms without `outliers`.
     repeatability : float
         Scatter of repeats about their mean, mm per coordinate; NaN without repeats.
     lack_of_fit : float
@@ -219,7 +215,6 @@ class Solution(HeldOut, Generic[Machine]):
     gap: float
     unidentifiable: tuple[str, ...]
     gauges: tuple[str, ...]
-    observability: dict[str, float]
     rms: float
     rms_before: float
     closure_rms: float
@@ -237,13 +232,9 @@ class Solution(HeldOut, Generic[Machine]):
     components: tuple[tuple[str, ...], ...]
     component_units: tuple[tuple[str, ...], ...]
     told_apart: bool
-    reading_noise: tuple[float, ...]
-    pose_noise: tuple[float, ...]
     residuals: tuple[FloatArray, ...]
     rows: IntArray
     outliers: tuple[int, ...]
-    distances_before: Distances
-    distances: Distances
     repeatability: float
     lack_of_fit: float
     lack_of_fit_chance: float
@@ -260,6 +251,37 @@ class Solution(HeldOut, Generic[Machine]):
     dropped_names: str = ""
     dropped_data: tuple[tuple[FitData, int], ...] = ()
     slack: tuple[SlackCable, ...] = ()
+
+    @cached_property
+    def observability(self) -> dict[str, float]:
+        """Indices O1 … O5 of the scaled Jacobian, over the identifiable combinations."""
+        estimate, poses = self.fit.estimate, len(self.fit.estimator.equations.table.actuators)
+        scaled = self.fit.estimator.scaled_triangle(estimate.evaluation)
+        return observability(scaled, poses, estimate.state.measured.rank)
+
+    @cached_property
+    def reading_noise(self) -> tuple[float, ...]:
+        """What a single reading of each set has of its own, mm per coordinate."""
+        return tuple(float(np.sqrt(own - shared)) for own, shared in self.fit.uncertainty.noises)
+
+    @cached_property
+    def pose_noise(self) -> tuple[float, ...]:
+        """What rows of one pose share beside it, mm per coordinate: pose and model errors."""
+        return tuple(float(np.sqrt(shared)) for _, shared in self.fit.uncertainty.noises)
+
+    @cached_property
+    def distances_before(self) -> Distances:
+        """Rms, median and 95 % quantile of the nominal machine's distances to fitted points, mm."""
+        return self._distances(self.fit.start)
+
+    @cached_property
+    def distances(self) -> Distances:
+        """Those of the calibrated machine, and its rms without `outliers`."""
+        return self._distances(self.fit.end)
+
+    def _distances(self, evaluation: Evaluation) -> Distances:
+        off = misfits.distances(self.fit.estimator.equations, evaluation)
+        return distances(off, np.isin(self.rows, self.outliers))
 
     @property
     def loss(self) -> str:

@@ -42,7 +42,7 @@ from pkmcal.measurements.tension import Tension, TensionSigma, filled_tension
 from pkmcal.measurements.time_stamps import Time
 from pkmcal.measurements.tracker import Tracker
 from pkmcal.readings.constants import columns_of_constants
-from pkmcal.readings.reading import Reading
+from pkmcal.readings.reading import Reading, names_of
 from pkmcal.readings.registry import Kind, as_reading, stated
 from pkmcal.readings.rows import numbers
 from pkmcal.result import Result
@@ -245,7 +245,7 @@ class Measurements(Result):
     @property
     def components(self) -> tuple[str, ...]:
         """Names of the components of one value: ("x", "y", "z") for a position."""
-        return tuple(name for name, _ in self.instrument.components)
+        return names_of(self.instrument.components)
 
     @property
     def units(self) -> tuple[str, ...]:

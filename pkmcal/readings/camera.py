@@ -40,7 +40,7 @@ from pkmcal.readings.lens import (
 from pkmcal.readings.lens_doubts import lens_doubts, pixels_outside
 from pkmcal.readings.lens_files import read_lens, write_lens
 from pkmcal.readings.measured import InFit, Measured
-from pkmcal.readings.pictures import Picture, pictures
+from pkmcal.readings.pictures import Picture, of_pictures_that_are_fitted, pictures
 from pkmcal.readings.predicted import At, Lots, Predicted, Shared
 from pkmcal.readings.reading import HeldNumbers, Reading, Sets, Solve
 from pkmcal.readings.seen_places import tool_places
@@ -282,6 +282,13 @@ class Camera(Reading):
     def lots(self, m: Measured) -> IntArray:
         """Rows in lots, one for each picture."""
         return self._pictures(m)
+
+    def not_apart(self, m: Measured, fitted: Measured) -> str:
+        """Corners of a picture are not apart from its other ones."""
+        return of_pictures_that_are_fitted(
+            m.actuators, self._corners(len(m)),
+            fitted.actuators, fitted.instrument._corners(len(fitted)),
+        )  # fmt: skip
 
     def shared(
         self,

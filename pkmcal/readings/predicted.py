@@ -77,6 +77,16 @@ class Predicted:
     by_frame: FloatArray | None = None
     by_other: FloatArray | None = None
 
+    def some(self, rows: slice) -> Predicted:
+        """Return these of some of the rows."""
+        return Predicted(
+            self.values[rows],
+            self.by_twist[rows],
+            {name: part[rows] for name, part in self.by.items()},
+            None if self.by_frame is None else self.by_frame[rows],
+            None if self.by_other is None else self.by_other[rows],
+        )
+
 
 def require_shape(what: str, found: object, shape: tuple[int, ...]) -> None:
     """Refuse what a class of the user's own returned if it is no array of this shape."""

@@ -72,6 +72,18 @@ class Family(NamedTuple):
 
 
 @cache
+def names_of(components: Components) -> tuple[str, ...]:
+    """Names of components."""
+    return tuple(name for name, _ in components)
+
+
+@cache
+def units_of(components: Components) -> tuple[str, ...]:
+    """Units of components."""
+    return tuple(unit for _, unit in components)
+
+
+@cache
 def families_by_unit(units: tuple[str, ...]) -> tuple[Family, ...]:
     """Group components by their units into families."""
     return tuple(
@@ -224,6 +236,10 @@ class Reading:
         """
         return None
 
+    def not_apart(self, m: Measured, fitted: Measured) -> str:
+        """The reason why rows tell nothing that is held out of others; "" where they do."""
+        return ""
+
     def shared(self, at: At, lots: Lots, **numbers: FloatArray) -> Shared:
         """Compute `predict` through the motions of lots of rows at one place each.
 
@@ -345,7 +361,7 @@ class Reading:
     @property
     def units(self) -> tuple[str, ...]:
         """Units of the components."""
-        return tuple(unit for _, unit in self.components)
+        return units_of(self.components)
 
     def mm(self, m: Measured, length: float) -> FloatArray:
         """Return the worth of one unit of each component at the machine, mm, (k,) or (N, k).
@@ -431,6 +447,8 @@ class Reading:
         """
         points = [name for name in self.own_points if np.ndim(getattr(self, name)) == 2]
         found = np.zeros(rows, dtype=np.intp)
+        if not (self.per_row or points):
+            return found
         for name in (*self.per_row, *points):
             given = getattr(self, name)
             if given is not None and len(given) == rows:

@@ -23,6 +23,7 @@ _IN_ONE_THREAD = 8192  # numbers
 _COLUMNS_AT_ONCE = 32  # of a factorisation
 _FEW_COLUMNS = 4  # of one with many columns
 _KEYS = 4096  # of rows that are added up at once
+_DENSE = 4  # times as many numbers as equations, below which those there are are ticked off
 
 
 @dataclass(frozen=True, eq=False)
@@ -245,7 +246,7 @@ def in_unit_basis(
         residual=residual,
         prior=prior @ back,
         back=back,
-        cluster=_shared(np.unique(cluster, return_inverse=True)[1].reshape(-1), cluster),
+        cluster=_shared(numbered(cluster), cluster),
         component=component,
     )
 
@@ -271,6 +272,10 @@ def numbered(*keys: IntArray) -> IntArray:
     combined = keys[0]
     for key in keys[1:]:
         combined = combined * (int(key.max()) + 1) + key
+    if len(combined) and int(combined.min()) >= 0 and int(combined.max()) < _DENSE * len(combined):
+        there = np.zeros(int(combined.max()) + 1, dtype=bool)  # quicker than to sort them
+        there[combined] = True
+        return np.asarray((np.cumsum(there) - 1)[combined])
     return np.unique(combined, return_inverse=True)[1].reshape(-1)
 
 

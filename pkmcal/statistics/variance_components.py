@@ -99,7 +99,8 @@ def _at_best(classes: IntArray, best: _Point) -> VarianceComponents | None:
 class _Point:
     """The restricted likelihood at variances theta, and its derivatives to their logarithms.
 
-    `curvature` is less the second one, `information` what is expected of it, to the variances.
+    `curvature` is less the second one, `by_logarithms` what is expected of it, `information` the
+    same to the variances.
     """
 
     theta: FloatArray
@@ -107,14 +108,9 @@ class _Point:
     slope: FloatArray
     curvature: FloatArray
     information: FloatArray
+    by_logarithms: FloatArray
     plain: FloatArray
     slopes: FloatArray
-
-    @property
-    def by_logarithms(self) -> FloatArray:
-        """`information` to the logarithms."""
-        matrix: FloatArray = self.information * np.outer(self.theta, self.theta)
-        return matrix
 
 
 def _solved(matrix: FloatArray, slope: FloatArray) -> FloatArray:
@@ -172,9 +168,12 @@ class _Model:
         )
         slope = 0.5 * (left / theta - (self.count - spent))
         pulled = (self._pulls - moved) / theta[:, None]
-        curvature = -(pulled @ plain @ pulled.T) - information * np.outer(theta, theta)
+        by_logarithms = information * np.outer(theta, theta)
+        curvature = -(pulled @ plain @ pulled.T) - by_logarithms
         curvature[every, every] += left / theta - slope
-        return _Point(theta, likelihood, slope, curvature, information, plain, slopes)
+        return _Point(
+            theta, likelihood, slope, curvature, information, by_logarithms, plain, slopes
+        )
 
     def highest(self, freedom: float) -> _Point | None:
         """Maximise the likelihood from equal degrees of freedom on; None as `at`."""
@@ -252,7 +251,8 @@ def told_apart(
             continue
         if here is not None and finest.score_chance(here, classes, few) > _NO_SLOPE:
             continue
-        other = _Model(fit, classes, prior_residual).highest(fit.freedom)
+        own = finest if classes is shown[-1] else _Model(fit, classes, prior_residual)
+        other = own.highest(fit.freedom)
         if other is None:
             continue
         gained = 2.0 * (other.likelihood - present.likelihood)
