@@ -7,7 +7,7 @@ import re
 import shlex
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ def written(path: Path, headings: Sequence[str], rows: Any) -> Path:
     return path
 
 
-def measured(name: str, kind: str) -> tuple[pk.Robot, Any, Any]:
+def measured(name: str, kind: Literal["position", "pose"]) -> tuple[pk.Robot, Any, Any]:
     """A machine with errors in its offsets, actuators and readings of 30 of its poses."""
     robot = pk.load(name)
     rng = np.random.default_rng(5)
