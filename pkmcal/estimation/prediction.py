@@ -21,7 +21,13 @@ from pkmcal.estimation.shapes import effect_of_rows, require_derivatives, requir
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.readings import orientation
-from pkmcal.readings.predicted import At, Predicted, joined, require_predicted
+from pkmcal.readings.predicted import (
+    At,
+    Predicted,
+    joined,
+    predicted_by,
+    require_predicted,
+)
 
 _BATCH = 1024  # rows whose derivatives by the parameters are made at once, as many as caches hold
 
@@ -166,11 +172,10 @@ class Prediction:
     def of_set(self, i: int, pose: FloatArray, theta: FloatArray) -> Predicted:
         """Predict the readings of a set at poses (K, 6), with their derivatives."""
         m = self.table.sets[i]
-        components = len(m.instrument.components)
-        if not components:
+        if not m.instrument.components:
             return Predicted(np.empty((len(m), 0)), np.empty((len(m), 0, 6)))
         alone = self._by_geometry_alone(i, pose, theta)
-        require_predicted(m.kind, components, len(m), alone)
+        require_predicted(m.instrument, len(m), alone)
         moved = self._moved(i, alone, pose, theta)
         require_derivatives(m.instrument, moved, self.numbers[i])
         return moved
@@ -223,7 +228,7 @@ class Prediction:
     def _by_geometry_alone(self, i: int, pose: FloatArray, theta: FloatArray) -> Predicted:
         reading = self.table.sets[i].instrument
         parts = [
-            (reading.predict(at, **numbers), rows)
+            (predicted_by(reading, at, numbers), rows)
             for at, numbers, rows in self.in_frames(i, pose, theta)
         ]
         return joined(*map(list, zip(*parts, strict=True)))
