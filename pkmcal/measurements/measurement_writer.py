@@ -9,8 +9,7 @@ from typing import Any
 from pkmcal.files.csv_writer import WrittenColumn, numbered, write_csv
 from pkmcal.measurements.field import row_fields
 from pkmcal.readings.constants import columns_of_constants
-from pkmcal.readings.predicted import of_the_package
-from pkmcal.readings.registry import KINDS, require_own_columns
+from pkmcal.readings.registry import require_read_back
 
 
 def write_measurements(
@@ -43,8 +42,7 @@ def write_measurements(
         A kind of the user's own whose columns are those of another kind: read back without it, its
         values would be taken for those.
     """
-    if not of_the_package(measurements.instrument):
-        require_own_columns((*KINDS.values(), measurements.instrument))
+    require_read_back(measurements.instrument, measurements.values, measurements.actuators)
     headings, cells = headed_cells(measurements, reading)
     write_csv(path, headings, cells, comment=comment)
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import cache
 from typing import NamedTuple, cast
 
 import pkmcal.readings as exported
 from pkmcal.arguments import shown, word
+from pkmcal.arrays import FloatArray
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.files.csv_table import Table
 from pkmcal.readings.closure import Closure
@@ -37,14 +38,42 @@ def require_own_columns(kinds: Iterable[Reading]) -> None:
     """
     every = tuple(kinds)
     for kind in every:
-        headings = dict.fromkeys((*(name for name, _ in kind.components), *kind.labels))
-        table = cast(Table, _Headings(headings))
-        mine = [each.name for each in every if each.found_in(table)]
-        if len(mine) > 1:
-            raise ArgumentTypeError(
-                f"kinds {' and '.join(mine)} both read the columns {', '.join(headings)}: names"
-                " of components, or found_in of their classes, have to tell files apart"
-            )
+        _refuse_both(kind, _readers(kind, every))
+
+
+def require_read_back(kind: Reading, values: FloatArray, actuators: FloatArray) -> None:
+    """Refuse a kind of the user's own whose table would be read back as a kind of the package.
+
+    Raises
+    ------
+    TypeError
+        Such kinds, by their names.
+    """
+    if kind.name in KINDS:
+        return
+    for other in _readers(kind, KINDS.values()):
+        try:
+            other.of_rows(values, actuators, None)
+        except ArgumentError:  # it needs more: an error when the table is read
+            continue
+        _refuse_both(kind, [other, kind])
+
+
+def _readers(kind: Reading, every: Iterable[Reading]) -> list[Reading]:
+    """The kinds that would read a table with the columns of one of them."""
+    headings = dict.fromkeys((*(name for name, _ in kind.components), *kind.labels))
+    table = cast(Table, _Headings(headings))
+    return [each for each in every if each.found_in(table)]
+
+
+def _refuse_both(kind: Reading, readers: Sequence[Reading]) -> None:
+    if len(readers) > 1:
+        columns = dict.fromkeys((*(name for name, _ in kind.components), *kind.labels))
+        raise ArgumentTypeError(
+            f"kinds {' and '.join(each.name for each in readers)} both read the columns"
+            f" {', '.join(columns)}: names of components, or found_in of their classes, have to"
+            " tell files apart"
+        )
 
 
 require_own_columns(_EVERY)
