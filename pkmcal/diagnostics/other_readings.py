@@ -60,10 +60,10 @@ def other_values(measured: Measurements) -> Iterator[tuple[Meant, Measurements]]
     for unit in dict.fromkeys(measured.units):
         mine = np.array([unit == other for other in measured.units])
         what = Family(unit).noun.replace("lengths", "measured lengths")
-        own = [name for name, other in zip(measured.components, mine, strict=True) if other]
+        alike = [name for name, other in zip(measured.components, mine, strict=True) if other]
         for name, factor, short in _FACTORS.get(unit, ()):
             values = measured.values * (factor if mine.all() else np.where(mine, factor, 1.0))
-            typed = in_unit(measured, own, short)
+            typed = in_unit(measured, alike, short)
             yield Meant(f"the {what} are in {name}", typed), replace(measured, values=values)
     names = measured.components
     for one, other in itertools.combinations(range(len(names)), 2):
