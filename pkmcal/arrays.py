@@ -30,6 +30,8 @@ _LONG = 8  # rows in a row that have a matrix in common, on the average, to be o
 # another processor or order of sums makes is up to some 1e-7 where they are differences, and no
 # choice may hang on it. The first of equal ones is taken.
 TIED = 1e-6
+# The share for numbers that are no differences of larger ones, such as distances.
+TIED_CLOSELY = 1e-9
 
 
 def as_numbers(name: str, array: ArrayLike, last: str | int) -> NDArray[Any]:

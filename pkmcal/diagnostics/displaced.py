@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray
+from pkmcal.diagnostics.check import CHANCE
 from pkmcal.diagnostics.columns import of_rows
 from pkmcal.display import chance_text, displayed, printable
 from pkmcal.estimation.fit_data import Dependence
@@ -22,7 +23,6 @@ from pkmcal.readings.predicted import Predicted
 from pkmcal.statistics.score_test import Columns, Score, score_test
 from pkmcal.statistics.shifts import TOLD_APART
 
-CHANCE = 0.01  # below which a target is said to be displaced
 _LARGE = 0.5  # of the squared residuals, from which they are little else
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.diagnostics.check import RARE
 from pkmcal.diagnostics.columns import of_rows
 from pkmcal.diagnostics.visits import visits_of
 from pkmcal.display import chance_text
@@ -19,7 +20,7 @@ from pkmcal.fitted.solution import Solution
 from pkmcal.readings.predicted import Predicted
 from pkmcal.statistics.score_test import Columns, beside
 
-CHANCE = 1e-3  # below which readings are late
+_MOST = 2.0  # ways: rows that are late by more are tried as whole rows
 
 
 @dataclass(frozen=True)
@@ -47,7 +48,7 @@ class Late:
     @property
     def found(self) -> bool:
         """True if readings and actuators are of different moments."""
-        return self.chance < CHANCE
+        return self.chance < RARE
 
     def __str__(self) -> str:
         odds = chance_text(self.chance)
@@ -62,12 +63,12 @@ class Late:
         short = f"{100 * abs(self.share):.2g} % of the way from the pose before"
         if self.share > 0.0:
             return (
-                f"readings are as if taken {short} before the machine arrived ({odds}): let it"
+                f"readings are as if taken {short}, before the machine arrived ({odds}): let it"
                 " settle for longer before each reading, and see that actuators and instrument are"
                 " logged at one moment"
             )
         return (
-            f"actuators are as if logged {short} before the machine arrived where the instrument"
+            f"actuators are as if logged {short}, before the machine arrived where the instrument"
             f" read it ({odds}): log both at one moment, when the machine stands"
         )
 
@@ -85,9 +86,13 @@ def late(found: Solution) -> Late | None:
     ways = {leaving: each for leaving, each in tested.items() if each is not None}
     # shared errors make as much more likely: of what is likely without them nothing else is asked
     scores = {
-        leaving: each.score() for leaving, each in ways.items() if len(ways) * each.chance < CHANCE
+        leaving: each.score() for leaving, each in ways.items() if len(ways) * each.chance < RARE
     }
-    known = {leaving: score for leaving, score in scores.items() if score is not None}
+    known = {
+        leaving: score
+        for leaving, score in scores.items()
+        if score is not None and abs(score.size[0]) <= _MOST
+    }
     if not known:
         return None
     leaving = min(known, key=lambda each: (known[each].chance, -known[each].drop))

@@ -14,6 +14,7 @@ from pkmcal.estimation.coarse_readings import DITHERED, Coarse
 from pkmcal.estimation.cut_readings import Cut
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.misfits import rounding_of
+from pkmcal.estimation.uncertainty import ROUNDED
 from pkmcal.fitted.row_names import row_names
 from pkmcal.fitted.solution import Solution
 from pkmcal.measurements.measurements import Measurements
@@ -24,7 +25,6 @@ from pkmcal.statistics.steps import LEAST_ROWS, step_of
 _CHANCE = 1e-3  # of residuals as small, were rounding errors independent
 _SIGNAL = 0.5  # of a step: deviation of what a fit changed, below which these errors are alike
 _WIDER = 1.2  # times, from which wider ± are worth a word
-_ROUNDED = 1e3  # times rounding errors of what is predicted
 
 
 # nothing was measured ---------------------------------------------------------------------------
@@ -41,7 +41,7 @@ def _nothing_measured(found: Solution) -> tuple[str, ...]:
         residual = start.residuals[i]
         values = m.values.reshape(residual.shape)
         own = np.array([step_of(values[:, k], unit) for k, unit in enumerate(m.units)])
-        limit = _half(m, own) + reach[i] + _ROUNDED * rounding_of(m, start.robot.length)
+        limit = _half(m, own) + reach[i] + ROUNDED * rounding_of(m, start.robot.length)
         off = np.stack(
             [_but_for_a_shift(*each) for each in zip(values.T, residual.T, strict=True)], axis=1
         )

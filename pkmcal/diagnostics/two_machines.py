@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, IntArray
+from pkmcal.diagnostics.check import RARE
 from pkmcal.diagnostics.reach import reach
 from pkmcal.diagnostics.visits import Visits, visits_of
 from pkmcal.display import chance_text, first_rows, printable
@@ -23,7 +24,6 @@ from pkmcal.statistics.group_test import Groups, few_equations, group_test, with
 from pkmcal.statistics.linear_fit import ROUNDING, LinearFit, numbered, orthonormal, reweighted
 from pkmcal.statistics.two_regressions import best_division
 
-CHANCE = 1e-3  # below which a group of rows is of another machine
 _LARGE = 0.8  # times the residuals, above which errors of a model may be as large
 _FAR = 0.7  # times the residuals, below which rows in no order, or elsewhere, are of another
 _MOST = 300  # visits of which such rows are looked for
@@ -63,7 +63,7 @@ class Apart:
     @property
     def found(self) -> bool:
         """True if the rows are of another machine."""
-        return self.chance < CHANCE
+        return self.chance < RARE
 
     def __str__(self) -> str:
         if self.elsewhere:
@@ -245,7 +245,7 @@ def _explained(columns: FloatArray, mine: BoolArray) -> bool:
     missing = 1.0 - float((along**2).sum() / (belongs**2).sum())
     ratio = (1.0 - missing) / ways * freedom / max(missing, ROUNDING)
     much = 1.0 - missing * (len(mine) - 1) / freedom > _APART
-    return much and f_tail(ratio, ways, freedom) < CHANCE
+    return much and f_tail(ratio, ways, freedom) < RARE
 
 
 def _groups(found: Solution, visits: Visits) -> Iterator[tuple[str, BoolArray]]:

@@ -145,7 +145,7 @@ class Equations:
 
     @cached_property
     def compressed(self) -> Equations | None:
-        """Fewer equations of the same squares; None where there are none.
+        """Fewer equations with these sums of squares; None where none are fewer.
 
         What they have at an evaluation is what these have but for rounding: squares, derivatives
         by the parameters and their products, degrees of freedom. Of rows by themselves they say

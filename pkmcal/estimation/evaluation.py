@@ -88,5 +88,5 @@ class Evaluation:
 
     @property
     def robot(self) -> Calibratable:
-        """The machine; that of the last session where some of its numbers are of sessions."""
+        """The machine, as it is in the last session where numbers differ by session."""
         return self.machines.robots[-1]

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray, IntArray, largest_first, lots
+from pkmcal.arrays import TIED_CLOSELY, BoolArray, FloatArray, IntArray, largest_first, lots
 from pkmcal.statistics.robust_scale import median_ratio
 
-_FALSE_ALARM = 0.01  # chance of naming any row at all where the noise is as stated
-_ALIKE = 1e-9  # share by which rows are further off than others that are not equally far off
+FALSE_ALARM = 0.01  # chance of naming any row, or slack cable, where the noise is as stated
 LARGE = 20  # components of a row that has an opinion of its own on how precise it is
 _FEW = 8  # such rows, from which on their scatter can be told
 _DEVIATION = 1.4826  # of a normal distribution in units of the median distance
@@ -96,11 +95,11 @@ def outliers(
         excess = np.where(kept, np.maximum(excess, 0.0), -1.0)
         allowed = rows // _MOST + 1 - np.count_nonzero(~kept)
         worst = _worst(excess, own, min(max(rows // _AT_ONCE, 1), allowed))
-        worst = worst[chance[worst] < _FALSE_ALARM / rows]
+        worst = worst[chance[worst] < FALSE_ALARM / rows]
         kept[worst] = False
         if len(worst) in (0, allowed):
             break
-    odd: IntArray = np.flatnonzero(~kept & (chance < _FALSE_ALARM / rows))
+    odd: IntArray = np.flatnonzero(~kept & (chance < FALSE_ALARM / rows))
     return odd
 
 
@@ -111,7 +110,7 @@ def _worst(excess: FloatArray, own: FloatArray, most: int) -> IntArray:
     """
     largest = float(excess.max())
     some = np.flatnonzero(excess >= _AS_ODD * largest)
-    order = some[largest_first(excess[some], _ALIKE * largest)]
+    order = some[largest_first(excess[some], TIED_CLOSELY * largest)]
     return np.concatenate([order[:1], order[1:][own[order[1:]] < _OWN]])[:most]
 
 

@@ -21,7 +21,7 @@ from pkmcal.statistics.clusters import Sandwich
 from pkmcal.statistics.distributions import f_tail
 from pkmcal.statistics.linear_fit import LinearFit
 
-_SAME = 1e-6  # share of a column that must be left beside the parameters
+LEFT = 1e-6  # share of a column that must be left beside others, for it to say anything of its own
 
 # Derivatives of the predicted values to held numbers, whitened: equations in their order, and their
 # rows (b, d). They are made anew for each pass: all at once may be larger than the design. Numbers
@@ -152,7 +152,7 @@ def _of_sums(
     unit = np.diag(1.0 / np.where(known, size, 1.0))[:, known]
     inner = by_basis @ unit
     values, ways = np.linalg.eigh(unit.T @ square @ unit - inner.T @ inner)
-    new = values > _SAME
+    new = values > LEFT
     half = unit @ (ways[:, new] / np.sqrt(values[new]))
     return Beside(fit, columns, by_basis, half, half.T @ pulls)
 
