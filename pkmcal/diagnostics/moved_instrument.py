@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.diagnostics.check import RARE
 from pkmcal.diagnostics.columns import of_rows
 from pkmcal.diagnostics.two_machines import row_of_equation
 from pkmcal.display import chance_text, displayed
@@ -22,7 +23,6 @@ from pkmcal.readings.predicted import Predicted
 from pkmcal.statistics.linear_fit import numbered
 from pkmcal.statistics.score_test import jump
 
-CHANCE = 1e-3  # below which something was moved
 _FEWEST = 3  # poses before and after
 _FEW = 10.0  # degrees of freedom below which nothing is told apart
 
@@ -60,7 +60,7 @@ class MovedInstrument:
     @property
     def found(self) -> bool:
         """True if it was moved."""
-        return self.chance < CHANCE
+        return self.chance < RARE
 
     def __str__(self) -> str:
         value, unit = displayed(self.size, self.unit)
