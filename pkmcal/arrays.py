@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +18,7 @@ IntArray = NDArray[np.intp]
 Int32Array = NDArray[np.int32]  # what the core writes
 Int64Array = NDArray[np.int64]
 TextArray = NDArray[np.str_]
+Held = TypeVar("Held", bound=NDArray[Any])
 
 Unit = Literal[
     "mm", "rad", "1", "1/mm", "1/rad", "1/mm2", "1/N", "N",
@@ -29,6 +30,8 @@ _LONG = 8  # rows in a row that have a matrix in common, on the average, to be o
 # another processor or order of sums makes is up to some 1e-7 where they are differences, and no
 # choice may hang on it. The first of equal ones is taken.
 TIED = 1e-6
+# The share for numbers that are no differences of larger ones, such as distances.
+TIED_CLOSELY = 1e-9
 
 
 def as_numbers(name: str, array: ArrayLike, last: str | int) -> NDArray[Any]:
@@ -144,16 +147,31 @@ def furthest_axis(direction: FloatArray) -> int:
     return first_largest(-along, TIED * float(along.max()))
 
 
-def lots(count: int, most: int = 16384) -> Iterator[slice]:
+def lots(count: int, most: int = 16384, first: int = 0) -> Iterator[slice]:
     """Slices of so many rows, one after another, to bound the memory of what is made of them.
+
+    They begin at row `first`.
 
     Examples
     --------
     >>> list(lots(5, 3))
     [slice(0, 3, None), slice(3, 6, None)]
     """
-    for first in range(0, count, most):
-        yield slice(first, first + most)
+    for start in range(first, count, most):
+        yield slice(start, start + most)
+
+
+def held_once(rows: Held) -> Held:
+    """Return rows (N, ...), which are in memory once, and cannot be written, where all are alike.
+
+    Examples
+    --------
+    >>> held_once(np.zeros((1000, 3))).strides
+    (0, 8)
+    """
+    if len(rows) < 2 or not (rows == rows[:1]).all():
+        return rows
+    return cast(Held, np.broadcast_to(rows[:1].copy(), rows.shape))
 
 
 def first_of_equal(rows: FloatArray) -> IntArray:

@@ -10,6 +10,7 @@ from itertools import islice, zip_longest
 
 _LEAST_CHANCE = 1e-16  # below, digits are rounding's
 _MOST_ROWS = 20  # of a table with a row for each pose
+LONGEST = 1000  # letters of a sentence: names that a user gave may be in it
 _LONGEST_NAME = 120  # letters that are shown of one
 _MOST_DECIMALS = 15  # a double has no digits beyond; also what an exact number is given
 

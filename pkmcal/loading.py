@@ -61,7 +61,7 @@ def load(robot: str | PathLike[str]) -> Robot | SerialArm:
         except ArgumentError as error:  # numbers that are each right, and too large together
             raise FileError(f"{source.place}: {error}") from None
     machine = Robot(robot_file.parse(source, file))
-    if machine.model.chains is None or machine.model.free:
+    if machine.model.closed_form or machine.model.free:
         return machine
     return Robot(replace(machine.model, free=independent_numbers(machine)))
 

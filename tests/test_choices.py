@@ -22,7 +22,7 @@ import pytest
 import pkmcal as pk
 from pkmcal.arms.inputs import joint_frames
 from pkmcal.geometry.chain_joints import across
-from pkmcal.geometry.model import Cone
+from pkmcal.geometry.limbs import Cone
 from pkmcal.kinematics.independent import independent_numbers
 from pkmcal.modes.find import frames_of
 from pkmcal.planning.optimal_design import CRITERIA

@@ -179,7 +179,7 @@ class Folder:
         return None if hidden else found
 
     def used(self) -> int:
-        """Bytes of all files."""
+        """Total size of all files, bytes."""
         return sum(each.lstat().st_size for each in self.path.rglob("*") if each.is_file())
 
     def _is_within(self, path: Path) -> bool:

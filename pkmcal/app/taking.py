@@ -16,6 +16,7 @@ from pkmcal.display import printable
 from pkmcal.exceptions import ArgumentError, FileError
 from pkmcal.jobs.calibration import Calibration
 from pkmcal.jobs.configuration import Importing
+from pkmcal.jobs.inputs import CONFIGURATIONS
 from pkmcal.jobs.machine import is_built_in
 from pkmcal.jobs.plan import Planning
 from pkmcal.jobs.project import Project
@@ -29,7 +30,6 @@ else:
 Kind = Literal["machine", "configuration", "log", "measurements", "camera", "columns", "project"]
 IMPORTED = "machine"  # the folder of what is made of a configuration
 _MACHINES = (".urdf", ".xacro", ".xml")
-_CONFIGURATIONS = (".cfg", ".g", ".gcode")
 _TABLES = (".csv", ".tsv", ".xlsx")
 _MAINS = ("printer.cfg", "config.g", "maslow.yaml")  # which run or include others
 _LOOKED_AT = 4_000_000  # bytes of a file
@@ -57,7 +57,7 @@ def kind_of(path: Path) -> Kind:
     if ending in _TABLES:
         return "measurements"
     text = _beginning(path)
-    if ending in _CONFIGURATIONS:
+    if ending in CONFIGURATIONS:
         return "configuration"
     if ending == ".toml":
         return _kind_of_toml(text)

@@ -19,11 +19,10 @@ from pkmcal.display import decimals, fixed, printable
 from pkmcal.exceptions import ArgumentError
 from pkmcal.jobs.calibration import Calibration
 from pkmcal.kinematics.calibratable import as_machine
-from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.report import contents, machine_view
 from pkmcal.report.rows import rows as every_row
-from pkmcal.view import page, parallel
+from pkmcal.view import page
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -190,7 +189,7 @@ def _numbers(found: Identification) -> list[Table]:
 
 def _view(found: Identification, arrows: list[Table]) -> Table | None:
     robot = found.robot
-    if isinstance(robot, Robot) and parallel.beyond(robot.model):
+    if page.beyond(robot):
         return None  # the page's core does not hold such a machine
     data = page.machine(robot, cloud=False)
     data["places"] = machine_view.measured_poses(found)

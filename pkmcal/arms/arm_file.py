@@ -11,13 +11,14 @@ import numpy as np
 from pkmcal import arguments, screw
 from pkmcal.arms import joint_law_file
 from pkmcal.arms.arm_geometry import arm_geometry
-from pkmcal.arms.inputs import ERRORS, KINDS, ArmArguments, kinds_of
+from pkmcal.arms.inputs import KINDS, ArmArguments, kinds_of
 from pkmcal.arrays import FloatArray, Unit
 from pkmcal.core.library import COORDINATE_UNITS, POSE
 from pkmcal.files.atomic import write_whole
 from pkmcal.files.toml_lines import Source
 from pkmcal.files.toml_table import Table, shown
 from pkmcal.geometry import robot_file
+from pkmcal.geometry.chain_joints import ERRORS
 from pkmcal.geometry.robot_file_writer import lines
 from pkmcal.geometry.stated_uncertainty import read_uncertainty
 

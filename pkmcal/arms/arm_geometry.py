@@ -9,10 +9,10 @@ from fnmatch import fnmatchcase
 import numpy as np
 
 from pkmcal.arguments import did_you_mean, words
-from pkmcal.arms.inputs import ERRORS
 from pkmcal.arms.joint_laws import JointLaws
 from pkmcal.arrays import FloatArray
 from pkmcal.exceptions import ArgumentError
+from pkmcal.geometry.chain_joints import ERRORS
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,6 @@ from pkmcal.geometry.stated_uncertainty import Uncertain
 Frame = Literal["space", "body", "tip"]
 JointKind = Literal["revolute", "prismatic"]
 KINDS: tuple[JointKind, ...] = ("revolute", "prismatic")
-ERRORS = ("dx", "dy", "dz", "dphi", "dtheta", "dpsi")  # of a joint: three in mm, three in rad
 
 
 class Source(NamedTuple):

@@ -187,7 +187,7 @@ class JointLaws:
         return np.array([self.numbers[term] for term in self.terms])
 
     def with_values(self, values: FloatArray) -> JointLaws:
-        """Other numbers (k,), in the same order."""
+        """Return the laws with other values of their numbers (k,)."""
         return replace(self, numbers=dict(zip(self.terms, values.tolist(), strict=True)))
 
     def with_terms(self, terms: Iterable[Term]) -> JointLaws:

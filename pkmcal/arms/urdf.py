@@ -15,8 +15,8 @@ from pkmcal.arms.inputs import ArmArguments, JointKind, Source
 from pkmcal.arrays import FloatArray
 from pkmcal.exceptions import FileError
 from pkmcal.files.atomic import write_whole
+from pkmcal.files.units import METRE
 
-_METRE = 1000.0  # mm
 _KINDS: dict[str, JointKind] = {
     "revolute": "revolute",
     "continuous": "revolute",
@@ -79,7 +79,7 @@ def write(
         origin = element.find("origin")
         if origin is None:
             origin = ElementTree.SubElement(element, "origin")
-        origin.set("xyz", _text(pose[:3] / _METRE))
+        origin.set("xyz", _text(pose[:3] / METRE))
         origin.set("rpy", _text(pose[3:]))
     before, behind = urdf_file.comments_around(source)
     text: str = ElementTree.tostring(root, encoding="unicode")

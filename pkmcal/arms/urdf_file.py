@@ -19,8 +19,8 @@ from pkmcal import screw
 from pkmcal.arrays import FloatArray
 from pkmcal.exceptions import FileError
 from pkmcal.files import reading
+from pkmcal.files.units import METRE
 
-_METRE = 1000.0  # mm
 _MOST_NESTED = 100
 _XACRO = "{http://www.ros.org/wiki/xacro}"
 
@@ -168,7 +168,7 @@ def _joint(path: str | PathLike[str], joint: ElementTree.Element) -> Element:
         ends.append(_attribute(place, found, "link"))
     origin = _only(place, joint, "origin")
     pose = (*_three(place, origin, "xyz"), *_three(place, origin, "rpy"))
-    home = screw.from_pose([*(_METRE * number for number in pose[:3]), *pose[3:]])
+    home = screw.from_pose([*(METRE * number for number in pose[:3]), *pose[3:]])
     axis = _three(place, _only(place, joint, "axis"), "xyz", default=(1.0, 0.0, 0.0))
     mimic = _only(place, joint, "mimic")
     follows = ""
@@ -194,7 +194,7 @@ def _inertials(
         if not 0.0 <= value < math.inf:
             raise FileError(f"{place}: <inertial> must have a mass of 0 or more")
         x, y, z = _three(place, _only(place, inertial, "origin"), "xyz")
-        yield str(link.get("name")), Inertial(value, (_METRE * x, _METRE * y, _METRE * z))
+        yield str(link.get("name")), Inertial(value, (METRE * x, METRE * y, METRE * z))
 
 
 def _limits(place: str, joint: ElementTree.Element, kind: str) -> tuple[float, float]:
@@ -210,7 +210,7 @@ def _limits(place: str, joint: ElementTree.Element, kind: str) -> tuple[float, f
         raise FileError(f"{place}: <limit> lower and upper must be numbers") from None
     if not low <= high:
         raise FileError(f"{place}: <limit> from {low:g} to {high:g}")
-    per_unit = _METRE if kind == "prismatic" else 1.0
+    per_unit = METRE if kind == "prismatic" else 1.0
     return low * per_unit, high * per_unit
 
 

@@ -50,7 +50,7 @@ def fixed_names(fix: str | Sequence[str]) -> tuple[tuple[str, ...], bool]:
 
 
 def now(before: dict[str, Any], others: dict[str, Any]) -> dict[str, Any]:
-    """Keywords of today for those of the version before."""
+    """Translate keywords of the version before into those of this one."""
     new: dict[str, Any] = {}
     roles = {role: before[role] for role in ROLES if before.get(role, "known") != "known"}
     if roles:

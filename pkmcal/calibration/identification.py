@@ -29,7 +29,7 @@ from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.fitted.held_numbers import considered_places
 from pkmcal.fitted.instruments import CalibratedPicture, pictures
 from pkmcal.fitted.instruments import instruments as instruments_of
-from pkmcal.fitted.machine_accuracy import machine_accuracy
+from pkmcal.fitted.machine_accuracy import UNDETERMINED, machine_accuracy
 from pkmcal.fitted.row_names import row_names
 from pkmcal.fitted.solution import Machine, Solution
 from pkmcal.kinematics.calibratable import as_machine, as_parallel
@@ -41,7 +41,6 @@ if TYPE_CHECKING:
 
 _STRONG = 0.95  # correlation worth a word
 _TIED_DECIMALS = 9  # decimals to which correlations differ that are not equal
-_UNIDENTIFIABLE = 1e-3  # mm a pose moves per mm along an unidentifiable combination
 
 
 class Identification(Solution[Machine], Result):
@@ -240,7 +239,7 @@ class Identification(Solution[Machine], Result):
         deviation = np.sqrt(variance)
         undetermined = self.fit.undetermined() * chosen.scale[:, None]
         moved = np.linalg.norm(by_geometry @ undetermined[own], axis=(1, 2))
-        return np.where(moved < _UNIDENTIFIABLE, deviation, np.inf).reshape(shape)
+        return np.where(moved < UNDETERMINED, deviation, np.inf).reshape(shape)
 
     def plot(self, path: str | PathLike[str] | None = None) -> Figure:
         """Draw the residuals by row, over the workspace and as quantiles.

@@ -115,11 +115,20 @@ def prepare(
     drawn = not isinstance(holdout, Measurements)
     if isinstance(holdout, Measurements):
         held = [as_fitted(machine, holdout, fitted, sessions=by_session)]
+        _require_apart(held, fitted)
     elif holdout is not None:
         pairs = [draw(data, holdout) for data in fitted]
         fitted, held = [kept for kept, _ in pairs], [(out, i) for i, (_, out) in enumerate(pairs)]
     rows = Rows(machine, given, fitted, held, drawn, missing).without(dropped)
     return replace(rows, fitted=[*rows.fitted, *known_distances(list(rows.fitted))])
+
+
+def _require_apart(held: Sequence[tuple[FitData, int]], fitted: Sequence[FitData]) -> None:
+    """Refuse rows to be held out that say what rows that are fitted say."""
+    for data, like in held:
+        m, other = data.measured, fitted[like].measured
+        if m.kind == other.kind and (reason := m.instrument.not_apart(m, other)):
+            raise ArgumentError(f"holdout: {reason}")
 
 
 def begin(rows: Rows, chosen: Parameters) -> Problem:
@@ -135,9 +144,9 @@ def begin(rows: Rows, chosen: Parameters) -> Problem:
 def _require_predictions(problem: Problem) -> None:
     """Refuse a reading, or an effect, that gives no number where the machine is known to be."""
     table, start = problem.exact.table, problem.start
-    for m, place, predicted in zip(table.sets, table.pose_of, start.predicted, strict=True):
-        read = np.isfinite(m.values.reshape(predicted.shape))
-        silent = (read & ~np.isfinite(predicted)).any(axis=1) & (start.status[place] == 0)
+    for m, place, off in zip(table.sets, table.pose_of, start.residuals, strict=True):
+        read = np.isfinite(m.values.reshape(off.shape))
+        silent = (read & ~np.isfinite(off)).any(axis=1) & (start.status[place] == 0)
         if silent.any():
             raise ArgumentError(
                 f"measurements: {m.kind}: nothing finite is predicted of row"

@@ -17,6 +17,7 @@ from pkmcal.fitted.holdout import HeldOut
 from pkmcal.fitted.instruments import CalibratedPicture
 from pkmcal.fitted.nuisances import Nuisance
 from pkmcal.fitted.solution import Solution
+from pkmcal.statistics.distributions import FEW
 from pkmcal.statistics.noise import SIGNIFICANT
 
 _WIDTH = 100  # letters on a line of the terminal
@@ -28,7 +29,6 @@ WIDER = (
     "± of loss 'cauchy' are for gross rows among sound ones; where the model itself is wrong, 95 %"
     " intervals held 73 to 84 % on a real arm, those of loss 'linear' 89 to 96 %"
 )
-_FEW = 10.0  # degrees of freedom below which a standard deviation says too little
 
 
 def notes(remarks: Sequence[str]) -> Iterator[str]:
@@ -272,7 +272,7 @@ def parameter_rows(table: Solution) -> Iterator[str | Table]:
     sure = np.isfinite(table.stderr)
     least = float(table.parameter_dof[sure].min()) if sure.any() else np.inf
     half = (table.interval95[:, 1] - table.interval95[:, 0]) / 2.0
-    wide = least < _FEW
+    wide = least < FEW
     rows = []
     for name, unit, value, sigma, start in zip(
         table.free,

@@ -8,9 +8,9 @@ from itertools import pairwise
 import numpy as np
 
 from pkmcal.arms.arm import SerialArm
-from pkmcal.arms.inputs import ERRORS
 from pkmcal.checks.finding import Finding
 from pkmcal.checks.function import USUAL, whole_size
+from pkmcal.geometry.chain_joints import ERRORS
 
 _TURNED = 0.2  # rad: no joint is turned so far from its place by error
 _SHIFTED = 0.1  # of the arm's length: none is shifted so far

@@ -10,6 +10,7 @@ from pkmcal.arrays import FloatArray
 from pkmcal.checks.finding import Finding, named
 from pkmcal.checks.function import outside_workspace, singular, turning
 from pkmcal.geometry.chain_joints import Joint
+from pkmcal.geometry.chains import Chains
 from pkmcal.kinematics import pose_steps
 from pkmcal.kinematics.robot import Robot
 
@@ -40,9 +41,8 @@ def mobility(robot: Robot) -> Iterator[Finding]:
 
 def home_values(robot: Robot) -> Iterator[Finding]:
     """Home values that are nearly the distance of the joints beside them."""
-    assert robot.model.chains is not None
-    for i, joint in robot.model.chains.actuated:
-        limb = robot.model.chains.limbs[i]
+    for i, joint in _chains(robot).actuated:
+        limb = _chains(robot).limbs[i]
         k = limb.index(joint)
         if joint.unit != "mm" or not 0 < k < len(limb) - 1 or joint.home_value == 0.0:
             continue
@@ -77,7 +77,6 @@ def strokes(robot: Robot) -> Iterator[Finding]:
 
 def stroke_units(robot: Robot) -> Iterator[Finding]:
     """Strokes of turning joints that run far beyond a turn: degrees taken for radians."""
-    assert robot.model.chains is not None
     for i, k, joint in _joints(robot):
         if joint.unit == "rad" and joint.stroke is not None:
             most = max(map(abs, joint.stroke))
@@ -85,7 +84,7 @@ def stroke_units(robot: Robot) -> Iterator[Finding]:
                 yield Finding(
                     "angle",
                     (i + 1,),
-                    f"the stroke of {robot.model.chains.name_of(i, k)} runs to"
+                    f"the stroke of {_chains(robot).name_of(i, k)} runs to"
                     f" {np.degrees(most):.6g} deg",
                     f"is {most:.6g} in degrees? See angle under [units]",
                 )
@@ -93,9 +92,8 @@ def stroke_units(robot: Robot) -> Iterator[Finding]:
 
 def along_its_rod(robot: Robot) -> Iterator[Finding]:
     """Axes of a U that lie along the rod beside it, which they turn about itself."""
-    assert robot.model.chains is not None
     for i, k, joint in _joints(robot):
-        limb = robot.model.chains.limbs[i]
+        limb = _chains(robot).limbs[i]
         for rod in (_rod(joint, limb[k + 1 :]), _rod(joint, limb[:k][::-1])):
             if joint.kind != "U" or rod is None:
                 continue
@@ -104,7 +102,7 @@ def along_its_rod(robot: Robot) -> Iterator[Finding]:
                     yield Finding(
                         "axis",
                         (i + 1,),
-                        f"the {_ORDINALS[n]} axis of the U {robot.model.chains.name_of(i, k)} lies"
+                        f"the {_ORDINALS[n]} axis of the U {_chains(robot).name_of(i, k)} lies"
                         " along its rod, which it turns about itself",
                         "give the U two axes across the rod; a rod that has to turn about itself"
                         " is an R",
@@ -199,11 +197,10 @@ def surplus(robot: Robot) -> str:
 
 def _joints(robot: Robot) -> Iterator[tuple[int, int, Joint]]:
     """Every joint once, with a limb that has it and its place there, both counted from 0."""
-    assert robot.model.chains is not None
     seen: set[str] = set()
-    for i, limb in enumerate(robot.model.chains.limbs):
+    for i, limb in enumerate(_chains(robot).limbs):
         for k, joint in enumerate(limb):
-            name = robot.model.chains.name_of(i, k)
+            name = _chains(robot).name_of(i, k)
             if name not in seen:
                 seen.add(name)
                 yield i, k, joint
@@ -234,11 +231,10 @@ def _ways(robot: Robot, q: FloatArray) -> int:
 
 
 def _has_idle_tail(robot: Robot) -> bool:
-    assert robot.model.chains is not None
     machine = robot.machine
     wanted = machine.m + min(0, machine.actuators - machine.rows)  # as `complete` takes them
     ways = _ways(robot, _away(robot)[1])
-    return bool(robot.model.chains.tail) and machine.rows <= machine.m and 0 < ways < wanted
+    return bool(_chains(robot).tail) and machine.rows <= machine.m and 0 < ways < wanted
 
 
 def _free_ways(robot: Robot, own: FloatArray, q: FloatArray) -> FloatArray:
@@ -272,3 +268,9 @@ def _direction(axis: FloatArray) -> str:
         if np.count_nonzero(shown) == 1 and shown[k]:
             return name
     return f"({', '.join(f'{x:.2f}' for x in shown)})"
+
+
+def _chains(robot: Robot) -> Chains:
+    """Return the joints of a machine, which is asked for what only chains have."""
+    assert robot.model.chains is not None
+    return robot.model.chains

@@ -166,7 +166,7 @@ def check_geometry(robot: Robot | SerialArm) -> GeometryCheck:
     else:
         instance("robot", robot, Robot, " or SerialArm")
         checks: Sequence[Callable[[Robot], Iterator[Finding]]] = CHECKS
-        if robot.model.chains is not None:
+        if not robot.model.closed_form:
             checks = CHAIN_CHECKS
         elif on_cables(robot):
             checks = CABLE_CHECKS
@@ -176,7 +176,7 @@ def check_geometry(robot: Robot | SerialArm) -> GeometryCheck:
 
 
 def _remark(robot: Robot) -> str:
-    if robot.model.chains is not None:
+    if not robot.model.closed_form:
         return surplus(robot)
     remarks = [unusual_size(robot), said_of_cables(robot) if on_cables(robot) else ""]
     return "; ".join(filter(None, remarks))

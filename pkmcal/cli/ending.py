@@ -14,11 +14,10 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from pkmcal.cli import interrupt
-from pkmcal.display import printable
+from pkmcal.display import LONGEST, printable
 from pkmcal.exceptions import Error, words_of
 
 DONE, NOT_TRUSTED, REFUSED, MISTAKE = 0, 1, 2, 3
-_LONGEST = 1000  # letters of a message: names of others may be in it
 _KINDS = {REFUSED: "input", MISTAKE: "mistake"}  # any other: stopped
 _WHERE = re.compile(r"(?P<file>.+?), line (?P<line>[0-9]+)(?:, column '(?P<column>[^']*)')?: ")
 
@@ -70,7 +69,7 @@ def warned(
 
 
 def _one_line(message: str) -> str:
-    return printable(" ".join(message.split()), _LONGEST)
+    return printable(" ".join(message.split()), LONGEST)
 
 
 def _of_command_line(error: Any) -> str:

@@ -19,8 +19,8 @@ from pkmcal.exceptions import ArgumentError
 from pkmcal.files.atomic import write_whole
 from pkmcal.files.toml_lines import Source
 from pkmcal.geometry import robot_file
-from pkmcal.geometry.limb_kinds import ALIASES, KINDS
-from pkmcal.geometry.model import CHAIN
+from pkmcal.geometry.limb_kinds import ALIASES, KEYS, KINDS
+from pkmcal.geometry.limbs import CHAIN
 from pkmcal.loading import load_parallel
 from pkmcal.report.as_json import as_json
 
@@ -40,34 +40,6 @@ _PARALLEL = """\
 # [stated]      what a data sheet claims, to compare: `rod = 340.0`
 # [[limb]]      one for each, counted from 1 in the names of its numbers (base1.x, offset1 …)
 """
-_KEYS = {
-    "kind": "{kinds}",
-    "actuator": "which q drives it, if not its own: several limbs may name one",
-    "base": "its joint on the base: [x, y, z], or {{ radius = …, angle = …, z = … }}",
-    "platform": "its joint on the platform, in the platform's frame",
-    "slider": "direction of the carriage's travel, of any length",
-    "normal": "of the plane that the limb stays in",
-    "revolute": "axis of its joint on the platform, in the platform's frame",
-    "universal": "first axis of its joint on the base, with couple",
-    "couple": "a length: makes its second constraint count too",
-    "weights": "of its constraints beside the length",
-    "over": "further points from which parts of the cable run to the platform: [[x, y, z], …]",
-    "parts": "how many parts run from base, and from each point under over",
-    "swivel": "axis of the pulley, along which the cable runs onto it, at base",
-    "radius": "of the pulley's groove",
-    "axis": "of the crank, at base",
-    "zero": "where the crank points at 0, or the pulley's swivel",
-    "crank": "length of the crank",
-    "rod": "length from carriage or crank to the platform joint",
-    "offset, gain": "the drive is at gain · q + offset; 0 and 1 if left out",
-    "branch": "which of the two places that a rod can lead to: 1 or -1",
-    "stiffness, rod_stiffness": "N/mm of the leg or the screw, N m/rad of the crank; of the rod",
-    "mass, anchor_mass": "kg: of leg or rod, half of it at each end; of the carriage",
-    "drive": "law of a drive with a shape: quadratic, spool, harmonics, table, backlash",
-    "stroke": "least and most of gain · q + offset",
-    "base_cone": "{{ axis = …, angle = … }}: how far its joint on the base swings",
-    "platform_cone": "the same of its joint on the platform",
-}
 _CHAINS = """\
 #   kind           chain: the joints of a limb in a row, from the base to the platform
 #   joints         each with its place at home, in the base frame:
@@ -168,6 +140,6 @@ def _limb_keys(limbs: Iterable[dict[str, object]]) -> Iterable[str]:
     explained = ("\n#" + 18 * " ").join(
         f"{name}: {KINDS[kind].what}" for name, kind in kinds.items()
     )
-    for names, words in _KEYS.items():
+    for names, words in KEYS.items():
         if names.split(",")[0] in used:
             yield f"#   {names:13}  {words.format(kinds=explained)}\n"

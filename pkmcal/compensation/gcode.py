@@ -17,9 +17,9 @@ from pkmcal.compensation.gcode_move import NO_FEED, Extrusion, Feed, Move
 from pkmcal.compensation.gcode_tools import Carried, Tools
 from pkmcal.exceptions import ArgumentError, FileError
 from pkmcal.files.text_lines import MARK
+from pkmcal.files.units import INCH
 
 _HOMING, _TOOL = "homing", "a change of tool"  # what messages call them
-_INCH = 25.4
 
 
 @dataclass
@@ -224,7 +224,7 @@ class Program:
     @staticmethod
     def _require_feed_of_units(found: Sequence[Command], state: _State) -> None:
         """Refuse F beside a change of units, before which it acts in a block."""
-        scales = {"G20": _INCH, "G21": 1.0}
+        scales = {"G20": INCH, "G21": 1.0}
         changes = any(scales.get(each.name, state.scale) != state.scale for each in found)
         if changes and any("F" in (each.words or {}) for each in found):
             raise Unclear(
@@ -271,7 +271,7 @@ class Program:
         elif words:
             raise Unclear(f"{min(words)} is no word of {command.shown}")
         elif name in ("G20", "G21"):
-            state.scale = _INCH if name == "G20" else 1.0
+            state.scale = INCH if name == "G20" else 1.0
             state.extruded = None  # it is of the units before
         elif name in ("G90", "G91"):
             state.relative = state.last = name == "G91"

@@ -186,7 +186,7 @@ def table(*also: Mapping[str, Meaning], **names: str) -> dict[str, Meaning]:
 
 
 def _between(name: str) -> list[str]:
-    """The names of a range."""
+    """Return the names of codes from a first to a last number."""
     ends = re.fullmatch(r"([GM])(\d+)-\1(\d+)", name)
     if ends is None:
         return [name]

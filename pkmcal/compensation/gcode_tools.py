@@ -64,7 +64,7 @@ class Tools:
 
 
 def _tool(command: Command) -> int:
-    """The number of a tool."""
+    """Return the number of a tool that a word names."""
     number = command.shown[1:].strip()
     if not number or float(number) % 1.0:
         raise Unclear(f"{command.shown} names no tool, and loads are stated by tool")

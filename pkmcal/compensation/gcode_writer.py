@@ -31,7 +31,7 @@ class Writer:
     def lines(
         self, line: str, move: Move, points: _Rows, commands: _Rows, share: Sequence[float]
     ) -> str:
-        """A move's line, and those of its further parts.
+        """Return the line of a move, and lines for its further parts.
 
         Parameters
         ----------
@@ -160,7 +160,7 @@ class Writer:
         point: Sequence[float],
         last: Sequence[float | None],
     ) -> str:
-        """The F word of a part.
+        """Return the word F, the feed, of a part of a move.
 
         Of a joint move, the reciprocal of its minutes. Else none, unless the controller would take
         another time: it takes F along X, Y and Z, and along angles where none of these moves.

@@ -16,7 +16,7 @@ from pkmcal.controllers.loss import require_plain
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.robot import Robot
 
-_METRE = 1e-3
+MILLIMETRE = 1e-3  # m
 MASS, INERTIA = "1", "0.01"  # kg, kg m²: an arm's file has none
 
 
@@ -82,7 +82,7 @@ def joints(arm: SerialArm) -> Iterator[TreeJoint]:
 
 def _origin(motion: FloatArray) -> FloatArray:
     pose = screw.to_pose(motion)
-    pose[:3] *= _METRE
+    pose[:3] *= MILLIMETRE
     return pose
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from pkmcal.arrays import FloatArray
 from pkmcal.controllers import c_source
 from pkmcal.controllers.c_source import Number
-from pkmcal.core.chains import GROUPS, ChainLayout
+from pkmcal.core.chains import GROUPS, ChainLayout, ChainMachine
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.robot import Robot
 
@@ -24,11 +25,18 @@ def contents(robot: Robot, prefix: str, number: Number) -> tuple[dict[str, Any],
     Raises
     ------
     ArgumentError
-        A machine with joints behind its platform, or with joints by which one chain holds another.
+        A machine with more closures than free coordinates, with joints behind its platform, or
+        with joints by which one chain holds another.
     """
-    model, n = robot.model, robot.n_actuators
-    assert model.chains is not None
-    layout = model.chains.layout
+    machine, n = robot.machine, robot.n_actuators
+    inner, slots, _ = machine.bare(robot.slots, np.zeros((1, n)))
+    assert isinstance(inner, ChainMachine)
+    layout, bare = inner.layout, slots.ravel()
+    if machine.rows != machine.m:
+        raise ArgumentError(
+            f"robot: {robot.name} has {machine.rows} closures for {machine.m} free coordinates;"
+            " a header holds chains with as many of both"
+        )
     if layout.tail < len(layout.zero):
         raise ArgumentError(
             f"robot: {robot.name} has joints behind its platform; a header holds none"
@@ -39,17 +47,16 @@ def contents(robot: Robot, prefix: str, number: Number) -> tuple[dict[str, Any],
         )
     one, several, whole = c_source.writers(number)
     wide = number == "double"
-    size, passive = robot.machine.struct.size, layout.passive
+    size, passive = machine.struct.size, layout.passive
     joints, group = np.diff(layout.first), GROUPS[layout.map]
     of_joint = np.where(layout.actuator >= 0, passive + layout.actuator, layout.coordinate)
     values, members = passive + n, len(layout.member)
     turns = np.zeros(values, dtype=bool)
     turns[of_joint] = layout.prismatic == 0
     of_member = of_joint[layout.member]
-    bare = robot.machine.bare(robot.slots, np.zeros((1, n)))[1].ravel()
     offset, gain = bare[layout.drive_place], bare[layout.drive_place + 1]
     links, points = _links(layout, bare)
-    unknowns = max(robot.machine.m + passive, 6)
+    unknowns = max(machine.m + passive, 6)
     says = {
         "chains": len(joints),
         "over": False,
@@ -72,7 +79,7 @@ def contents(robot: Robot, prefix: str, number: Number) -> tuple[dict[str, Any],
         "group": group,
         "closes": whole(_CLOSES[layout.map]),
         "most_joints": int(joints.max()),
-        "unknowns": robot.machine.m + passive,
+        "unknowns": machine.m + passive,
         "arm": one(layout.length),
         # what a step leaves is its square by pivot and size
         "settled": one((1e-10 if wide else 2e-5) * size),
@@ -84,6 +91,13 @@ def contents(robot: Robot, prefix: str, number: Number) -> tuple[dict[str, Any],
         "calls": (_calls(layout), _calls(layout), unknowns),
     }
     return says, list(_CALLED)
+
+
+def numbers(
+    robot: Robot, texts: list[str], prefix: str, several: Callable[[Any], str]
+) -> tuple[dict[str, Any], list[str]]:
+    """None: functions of chains read the arrays that `contents` fills."""
+    return {}, texts
 
 
 def _links(layout: ChainLayout, numbers: FloatArray) -> tuple[list[FloatArray], list[FloatArray]]:

@@ -37,7 +37,6 @@ _GROOVE = [SLOTS.index(slot) for slot in OWN_SLOTS]
 _NEARER, _TIE = 1e-12, 1e-15  # of turns that agree, as agreed_turn of csrc/inverse.h has them
 # rad, of sines: below it the multiples of the parts of π/2 that they take off are exact
 _MOST_ANGLE: dict[Number, float] = {"double": 1e5, "float": 6e3}
-_UNUSED_FRAME = np.zeros(9)
 
 
 def c_header(robot: Robot, path: str | PathLike[str], number: Number = "double") -> Loss | None:
@@ -99,13 +98,7 @@ def text_of(robot: Robot, prefix: str, number: Number) -> str:
     word("number", number, ("double", "float"))
     loaded = c_loaded.contents(robot, number) if c_loaded.holds(robot) else None
     robot = robot.rigid
-    machine = robot.machine
     require_no_tackles(robot, "a header")
-    if robot.model.chains is not None and machine.rows != machine.m:
-        raise ArgumentError(
-            f"robot: {robot.name} has {machine.rows} closures for {machine.m} free coordinates;"
-            " a header holds chains with as many of both"
-        )
     return rendered("robot.h.jinja", _contents(robot, loaded, prefix, number))
 
 
@@ -117,7 +110,7 @@ def _contents(
     map = model.map
     laws = _laws(robot)
     _require_sines(robot, laws, number)
-    made = c_limbs if model.chains is None else c_chains
+    made = c_limbs if model.closed_form else c_chains
     own, called = made.contents(robot, prefix, number)
     needed = ["pose_frame", *([] if robot.frames.trivial else ["pose_compose"])]
     needed += [f"map_{map}_{part}" for part in _MAP_PARTS] + called
@@ -130,10 +123,8 @@ def _contents(
     )
     one, several, whole = c_source.writers(number)
     texts = [c_source.as_c99(f, prefix, number, c_limbs.ENUMERATORS) for f in functions]
-    if model.chains is None:
-        slots = c_source.slots_read(texts, prefix, c_limbs.ENUMERATORS)
-        own |= c_limbs.numbers(robot, slots, prefix, several)
-        texts = c_source.of_slots(texts, prefix, c_limbs.ENUMERATORS, slots)
+    numbers, texts = made.numbers(robot, texts, prefix, several)
+    own |= numbers
     wide = number == "double"
     size = machine.struct.size
     inverse, step, unknowns = own.pop("calls")

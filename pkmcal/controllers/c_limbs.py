@@ -16,7 +16,7 @@ from pkmcal.core.library import AXES, DRIVERS, ROWS, SLOTS
 from pkmcal.core.pulleys import OWN_SLOTS
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.limb_kinds import KINDS
-from pkmcal.geometry.model import Limb
+from pkmcal.geometry.limbs import Limb
 from pkmcal.kinematics.robot import Robot
 
 ENUMERATORS = tuple(slot.upper().replace(".", "_") for slot in SLOTS)
@@ -106,15 +106,17 @@ def _limits(over: bool, number: Number, size: float) -> dict[str, str]:
 
 
 def numbers(
-    robot: Robot, slots: Sequence[str], prefix: str, several: Callable[[Any], str]
-) -> dict[str, Any]:
-    """The numbers of each limb at the slots that functions read."""
+    robot: Robot, texts: list[str], prefix: str, several: Callable[[Any], str]
+) -> tuple[dict[str, Any], list[str]]:
+    """Numbers of limbs at the slots that functions read, and the functions that read these."""
+    slots = c_source.slots_read(texts, prefix, ENUMERATORS)
     _, own, _ = robot.machine.bare(robot.slots, np.zeros((1, robot.n_actuators)))
     places = [ENUMERATORS.index(slot) for slot in slots]
-    return {
+    says = {
         "slots": [f"{prefix}_{name}" for name in slots],
         "numbers": [several(row[places]) for row in own],
     }
+    return says, c_source.of_slots(texts, prefix, ENUMERATORS, slots)
 
 
 def _geared(robot: Robot) -> list[bool]:

@@ -26,7 +26,7 @@ from pkmcal.screw import from_pose
 def holds(robot: Robot) -> bool:
     """Return whether a header can hold the compliances: of offsets, each of its own actuator."""
     model = robot.model
-    if model.elastic is None or model.chains is not None or model.driven:
+    if model.elastic is None or not model.closed_form or model.driven:
         return False
     alone = robot.n_actuators == len(model.limbs)
     return alone and all(spring.of_drive for spring in model.elastic.springs)

@@ -23,7 +23,7 @@ from pkmcal.exceptions import ArgumentError, FileError
 from pkmcal.files import reading
 from pkmcal.files.text_lines import lines_of
 from pkmcal.geometry.geometry import Geometry
-from pkmcal.geometry.model import Limb
+from pkmcal.geometry.limbs import Limb
 from pkmcal.kinematics.robot import Robot
 from pkmcal.result import Result
 

@@ -129,7 +129,7 @@ def marlin(robot: Robot, path: str | PathLike[str], project: bool = False) -> Lo
 
 
 def _marlin(robot: Robot, wanted: Wanted, text: str | None) -> tuple[str, Loss]:
-    """The three lines."""
+    """Return Marlin's three lines of a delta's geometry."""
     firmware, loss = of_robot(robot, wanted.project)
     if robot.model.probe is None:
         raise ArgumentError(

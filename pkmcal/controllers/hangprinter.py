@@ -28,7 +28,7 @@ from pkmcal.controllers.gcode_words import (
     written,
 )
 from pkmcal.controllers.laws import require_no_laws, require_no_pulleys
-from pkmcal.controllers.loss import Loss, cylinder, fitted, require_held
+from pkmcal.controllers.loss import COMPARED, Loss, cylinder, fitted, require_held
 from pkmcal.controllers.own_file import Wanted, write_for
 from pkmcal.controllers.reprap_files import own_config
 from pkmcal.controllers.robot_files import About
@@ -38,7 +38,6 @@ from pkmcal.kinematics.robot import Robot, require_parallel
 
 _LETTERS = "ABCD"
 _LINES = len(_LETTERS)
-_POSES = 200
 _KIND = 6  # K
 _SPOOL = Law(spool=True)
 
@@ -284,4 +283,4 @@ def _workspace(robot: Robot, anchors: FloatArray) -> tuple[FloatArray, str]:
     if not (across > 0.0 and high > 0.0):
         raise ArgumentError(f"robot: {robot.name}: one anchor at least must be above the origin")
     over = f"within {across:.0f} mm of the origin and {high:.0f} mm above it"
-    return cylinder(across, high, _POSES), over
+    return cylinder(across, high, COMPARED), over

@@ -7,11 +7,11 @@ from functools import partial
 from os import PathLike
 
 from pkmcal.controllers import linear_delta, rotary_delta
+from pkmcal.controllers.gcode_words import SAME
 from pkmcal.controllers.loss import Loss
 from pkmcal.controllers.own_file import Wanted, write_for
 from pkmcal.controllers.printer_config import (
     ANGLES,
-    SAME,
     STEPPERS,
     PrinterConfig,
     kinematics,

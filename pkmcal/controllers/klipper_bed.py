@@ -1,4 +1,4 @@
-"""Where Klipper and Kalico let the nozzle of a delta go, as a cylinder that a robot file can state.
+"""The cylinder to which Klipper and Kalico confine the nozzle of a delta, for a robot file.
 
 Their `check_move` (klippy/kinematics/delta.py, rotary_delta.py) narrows the radius near the top: to
 what a carriage below its end stop allows if its tower stands in the direction in which the nozzle

@@ -95,7 +95,7 @@ def contents(robot: Robot, folder: str) -> tuple[dict[str, str], Loss | None]:
             f" cannot hold: {off}; its `rigid` can be exported"
         )
     tabled = robot
-    if robot.model.chains is not None:
+    if not robot.model.closed_form:
         _require_no_backlash(robot)
     elif not _folded(robot):  # the module is of the joints
         robot = without_laws(robot)

@@ -16,14 +16,13 @@ from scipy.spatial.transform import Rotation
 from pkmcal.arrays import TIED, FloatArray, first_largest
 from pkmcal.controllers import linear_delta, rotary_delta
 from pkmcal.controllers.linear_delta import FirmwareDelta
-from pkmcal.controllers.loss import Loss, fitted
+from pkmcal.controllers.loss import COMPARED, Loss, fitted
 from pkmcal.controllers.rotary_delta import OVER, RotaryDelta
 from pkmcal.core.poses import invert
 from pkmcal.kinematics.robot import Robot
 from pkmcal.kinematics.workspace import sample_poses
 
 _LEGS = 6
-_POSES = 200
 _LINEAR = (90.0, 210.0, 330.0)  # of joints 0, 1 and 2
 _ROTARY = (270.0, 30.0, 150.0)
 _NO_LOSS = Loss(0.0, 0.0, OVER)
@@ -118,7 +117,7 @@ def _rotary(robot: Robot) -> Module:
 def _fitted(
     model: Callable[[FloatArray], Robot], start: FloatArray, robot: Robot
 ) -> tuple[FloatArray, Loss]:
-    poses = sample_poses(robot, _POSES)
+    poses = sample_poses(robot, COMPARED)
     return fitted(model, start, robot.inverse(poses), poses, OVER)
 
 

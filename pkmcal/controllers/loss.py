@@ -14,7 +14,7 @@ from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.robot import Robot
 from pkmcal.kinematics.workspace import sample_poses
 
-_SAGS = 200  # poses
+COMPARED = 200  # poses at which a machine and what a controller holds of it are compared
 EXACT = 1e-6  # mm: firmware numbers have six decimals
 
 
@@ -85,7 +85,7 @@ def loss(model: Robot, q: FloatArray, poses: FloatArray, over: str) -> Loss:
 def sag(robot: Robot) -> Loss:
     """Return how far a machine that yields is from the rigid one, where it does not give way."""
     rigid = robot.rigid
-    poses, q, _ = rigid.commanded(sample_poses(rigid, _SAGS, share=0.5))
+    poses, q, _ = rigid.commanded(sample_poses(rigid, COMPARED, share=0.5))
     off = robot.forward(q, guess=poses).pose[:, :3] - poses[:, :3]
     return Loss.of(off, "by what yields under the stated load, over half of its workspace")
 
@@ -97,7 +97,7 @@ def laws(arm: SerialArm) -> Loss:
     most = np.where(turning, np.pi, arm.length)
     low = np.where(np.isfinite(limits[:, 0]), limits[:, 0], -most)
     high = np.where(np.isfinite(limits[:, 1]), limits[:, 1], most)
-    theta = low + (high - low) * np.random.default_rng(0).random((_SAGS, arm.n_joints))
+    theta = low + (high - low) * np.random.default_rng(0).random((COMPARED, arm.n_joints))
     off = (arm.forward(theta) - arm.rigid.forward(theta))[:, :3, 3]
     return Loss.of(off, "by what its joints add to their commands")
 

@@ -193,7 +193,7 @@ def _workspace(anchors: FloatArray) -> FloatArray:
 
 
 def _changed(text: str, place: str, values: dict[str, float]) -> str:
-    """The user's file with the anchors written into it, where they are not the same."""
+    """Write anchors that differ into the user's file."""
     there = [found["name"] for found in _ANCHOR.finditer(text)]
     for name in values:
         if there.count(name) != 1:

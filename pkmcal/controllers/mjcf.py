@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from pkmcal.arguments import path as as_path
 from pkmcal.arrays import FloatArray, furthest_axis
+from pkmcal.controllers.arm_tree import MILLIMETRE
 from pkmcal.controllers.c_limbs import prepared
 from pkmcal.controllers.laws import require_plain_limbs
 from pkmcal.controllers.loss import Loss, sag
@@ -18,7 +19,7 @@ from pkmcal.exceptions import ArgumentError
 from pkmcal.files.atomic import write_whole
 from pkmcal.geometry.drivers import Driver
 from pkmcal.geometry.limb_kinds import KINDS
-from pkmcal.geometry.model import CHAIN
+from pkmcal.geometry.limbs import CHAIN
 from pkmcal.kinematics.robot import Robot, require_parallel
 
 _PLATFORM = {  # joints of the platform by pose map; none: it is free
@@ -27,7 +28,6 @@ _PLATFORM = {  # joints of the platform by pose map; none: it is free
     "planar": ("x", "y", "gamma"),
 }
 _ROWS = {"UPS": (), "PUS": (), "RUS": (), "RPS": ("base_plane",)}
-_METRE = 1e-3
 
 
 def mjcf(robot: Robot, path: str | PathLike[str]) -> Loss | None:
@@ -89,7 +89,7 @@ def text_of(robot: Robot) -> str:
         tip = _limb(
             world, i, kind.driver, g, drive, directions[0, i], (first[i], second[i]), axes[i][0]
         )
-        anchor = _numbers([0.0, 0.0, tip * _METRE])
+        anchor = _numbers([0.0, 0.0, tip * MILLIMETRE])
         Xml.SubElement(equality, "connect", body1=f"limb{i + 1}", body2="platform", anchor=anchor)
         if limb.actuator not in driving:
             driving[limb.actuator] = i
@@ -141,7 +141,7 @@ def _platform(world: Xml.Element, map: str, home: FloatArray) -> None:
         Xml.SubElement(body, "freejoint", name="platform")
     for name in names:
         axis = np.eye(3)["xyz".index(name) if name in "xyz" else 2]
-        kind, scale = ("slide", _METRE) if name in "xyz" else ("hinge", 1.0)
+        kind, scale = ("slide", MILLIMETRE) if name in "xyz" else ("hinge", 1.0)
         if name in "xyz":
             axis = turned.inv().apply(axis)  # in the body's axes
         value = home[POSE.index(name)] * scale
@@ -164,11 +164,11 @@ def _limb(
     if not driver.carries:
         leg = _swinging(world, f"leg{i + 1}", base, along, normal)
         tip = _body(leg, f"limb{i + 1}", np.array([0.0, 0.0, drive]), None)
-        _joint(tip, name, "slide", np.array([0.0, 0.0, 1.0]), drive * _METRE)
+        _joint(tip, name, "slide", np.array([0.0, 0.0, 1.0]), drive * MILLIMETRE)
         return 0.0
     if driver.slides:
         carriage = _body(world, f"carriage{i + 1}", base + drive * first, None)
-        _joint(carriage, name, "slide", first, drive * _METRE)
+        _joint(carriage, name, "slide", first, drive * MILLIMETRE)
         _swinging(carriage, f"limb{i + 1}", np.zeros(3), along, np.zeros(3))
         return rod
     crank = _body(world, f"crank{i + 1}", base, None)
@@ -196,7 +196,7 @@ def _swinging(
 
 
 def _body(parent: Xml.Element, name: str, at: FloatArray, turned: Rotation | None) -> Xml.Element:
-    body = Xml.SubElement(parent, "body", name=name, pos=_numbers(at * _METRE))
+    body = Xml.SubElement(parent, "body", name=name, pos=_numbers(at * MILLIMETRE))
     if turned is not None:
         body.set("quat", _numbers(np.roll(turned.as_quat(), 1)))  # w first
     inertia = {"pos": "0 0 0", "mass": "1", "diaginertia": "0.01 0.01 0.01"}

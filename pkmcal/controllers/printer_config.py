@@ -17,6 +17,7 @@ from os import PathLike
 from pathlib import Path
 
 from pkmcal.arguments import path as as_path
+from pkmcal.controllers.gcode_words import SAME
 from pkmcal.exceptions import FileError
 from pkmcal.files.text_lines import MARK, lines_of, text_in
 
@@ -26,7 +27,6 @@ ANGLES = {  # by kinematics, where the file says nothing
     "delta": dict(zip(STEPPERS, (210.0, 330.0, 90.0), strict=True)),
     "rotary_delta": dict(zip(STEPPERS, (30.0, 150.0, 270.0), strict=True)),
 }
-SAME = 5e-7  # of numbers with six decimals
 
 _SAVED = re.compile(r"#\*# <-+ SAVE_CONFIG -+>")
 _PREFIX = "#*# "

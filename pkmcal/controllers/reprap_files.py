@@ -84,7 +84,7 @@ class _Run:
         self.hides: list[str] = []
 
     def of(self, text: str, file: Path, within: tuple[Path, ...]) -> str:
-        """The text of a file, with that of the files it runs behind their commands."""
+        """Return the text of a file, with files that it runs behind the commands that run them."""
         for code in GEOMETRY:  # a mistake is named with the line of its own file
             settings(text, code, str(file), missing=True)
         require_mm(text, str(file), *GEOMETRY)

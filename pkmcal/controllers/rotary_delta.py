@@ -16,7 +16,7 @@ from pkmcal.controllers import robot_files
 from pkmcal.controllers.c_limbs import prepared
 from pkmcal.controllers.laws import require_plain_limbs
 from pkmcal.controllers.linear_delta import Bed
-from pkmcal.controllers.loss import Loss, fitted, require_held
+from pkmcal.controllers.loss import COMPARED, Loss, fitted, require_held
 from pkmcal.controllers.robot_files import About
 from pkmcal.core.library import SLOTS
 from pkmcal.exceptions import ArgumentError
@@ -26,7 +26,6 @@ from pkmcal.kinematics.workspace import sample_poses
 OVER = "over half of its workspace"
 _TOWERS = 3
 _LOWEST = 180.0  # deg: a crank that points inward; no firmware states its lower end
-_POSES = 200
 
 
 @dataclass(frozen=True)
@@ -59,7 +58,7 @@ class RotaryDelta:
 
     @property
     def across(self) -> float:
-        """How far from the middle arms and rods reach level with the shoulders, mm."""
+        """Distance from the middle that arms and rods reach level with the shoulders, mm."""
         return min(self.radius + min(self.cranks), min(self.rods) - self.radius)
 
     @property
@@ -93,7 +92,7 @@ def of_robot(robot: Robot, project: bool, one_height: bool) -> tuple[RotaryDelta
     require_rotary_delta(robot)
     home = float(robot.home[2])
     built = as_built(robot, one_height)
-    poses = sample_poses(robot, _POSES)
+    poses = sample_poses(robot, COMPARED)
     q = robot.inverse(poses)
 
     def of(x: FloatArray) -> RotaryDelta:

@@ -49,7 +49,7 @@ def reprap_commands(
 
 
 def reprap_lines(commands: Commands) -> str:
-    """The two lines."""
+    """Return RepRapFirmware's two lines of a rotary delta's geometry."""
     return lines(commands, M669=_KIND)
 
 

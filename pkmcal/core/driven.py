@@ -136,7 +136,7 @@ class DrivenMachine(CoreMachine):
         return bare
 
     def _within(self, place: int) -> int:
-        """Place of a number of the machine within in its own geometry."""
+        """Return the place of a number in the geometry of the machine without laws."""
         row, column = divmod(place, self._wide)
         return row * self._width + column
 

@@ -7,7 +7,7 @@ import numpy as np
 from pkmcal.arrays import FloatArray
 from pkmcal.core.library import call, rows
 
-_NOWHERE = np.zeros(6)
+NOWHERE = np.zeros(6)  # the pose of a frame that is not displaced
 
 
 def tpr2tps_lengths(size: FloatArray, free: FloatArray, out: FloatArray) -> None:
@@ -49,6 +49,6 @@ def compose_twists(a: FloatArray, pose: FloatArray, c: FloatArray) -> FloatArray
 def rates_of_twists(pose: FloatArray, twists: FloatArray) -> FloatArray:
     """Rates (N, 6, k) of x y z α β γ of poses (N, 6) that move with twists (ω, v), (N, 6, k)."""
     level = np.zeros_like(pose)  # turns about the axes are rates of its angles
-    rates = compose_rates(_NOWHERE, level, _NOWHERE, pose)
+    rates = compose_rates(NOWHERE, level, NOWHERE, pose)
     moved: FloatArray = rates @ np.concatenate([twists[:, 3:], twists[:, :3]], axis=1)
     return moved

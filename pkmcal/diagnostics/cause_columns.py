@@ -188,8 +188,8 @@ def _lean(fit: Fit) -> Columns | None:
 
     def change(i: int, rows: slice, seen: Predicted) -> FloatArray:
         if known[i] and "target" in seen.by:
-            return seen.by["target"][rows]
-        return np.zeros((*seen.values[rows].shape, 3))
+            return seen.by["target"]
+        return np.zeros((*seen.values.shape, 3))
 
     return of_rows(fit, change) if any(known) else None
 
@@ -264,8 +264,8 @@ def _held(held: HeldNumbers) -> Callable[[Fit], Columns | None]:
 
         def change(i: int, rows: slice, seen: Predicted) -> FloatArray:
             if known[i] and held.argument in seen.by:
-                return seen.by[held.argument][rows][:, :, list(held.slots)]
-            return np.zeros((*seen.values[rows].shape, len(held.slots)))
+                return seen.by[held.argument][:, :, list(held.slots)]
+            return np.zeros((*seen.values.shape, len(held.slots)))
 
         return of_rows(fit, change) if any(known) else None
 

@@ -11,6 +11,7 @@ from pkmcal.display import chance_text
 from pkmcal.fitted.fit import Fit
 from pkmcal.fitted.solution import Solution
 from pkmcal.statistics.causes import causes
+from pkmcal.statistics.distributions import FEW
 from pkmcal.statistics.score_test import Columns
 
 CHANCE = 0.05  # of naming any cause of a sound machine
@@ -18,7 +19,6 @@ SURE = 0.01  # below which one that moves the numbers makes a result doubtful
 HARMFUL = 1.0  # standard deviations, rms over the parameters
 _MOST = 3  # that are named
 _CERTAIN = 1e-4  # chance below which a cause is named of a fit that is none
-_FEW = 10.0  # degrees of freedom below which residuals tell no causes apart
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ def _explained(
 ) -> tuple[FoundCause, ...]:
     """Test causes, the one that explains most first."""
     sure = found.fit.uncertainty
-    if sure.rounded or not usable(found.fit.estimate.evaluation) or sure.tested.freedom < _FEW:
+    if sure.rounded or not usable(found.fit.estimate.evaluation) or sure.tested.freedom < FEW:
         return ()
     pairs = list(possible(found.fit))
     every = causes(sure.tested, [columns for _, columns in pairs], CHANCE, _MOST)

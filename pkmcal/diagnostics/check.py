@@ -14,6 +14,8 @@ from pkmcal.estimation.loss import LIMITS
 from pkmcal.exceptions import ArgumentError
 from pkmcal.fitted.solution import Solution
 
+CHANCE = 0.01  # with which a check of all readings may doubt sound ones
+RARE = 0.001  # with which one that tries many groups of them may
 F = TypeVar("F")
 Level = Literal["grave", "doubt", "remark"]
 

@@ -20,6 +20,7 @@ from pkmcal.diagnostics import (
     rounded,
     rows,
     sag,
+    scale,
     search,
     sides,
     units,
@@ -28,9 +29,9 @@ from pkmcal.diagnostics import (
 from pkmcal.diagnostics.diagnosis import verified
 
 CHECKS = verified((
-    *held_out.CHECKS, *readings.CHECKS, *units.CHECKS, *refitted_readings.CHECKS, *families.CHECKS,
-    *machine.CHECKS, *loads.CHECKS, *sag.CHECKS, *search.CHECKS, *rows.CHECKS, *elsewhere.CHECKS,
-    *near_copies.CHECKS, *rounded.CHECKS, *noise.CHECKS, *priors.CHECKS, *course.CHECKS,
-    *causes.CHECKS, *sides.CHECKS, *regions.CHECKS, *gain.CHECKS, *waves.CHECKS,
+    *held_out.CHECKS, *readings.CHECKS, *scale.CHECKS, *units.CHECKS, *refitted_readings.CHECKS,
+    *families.CHECKS, *machine.CHECKS, *loads.CHECKS, *sag.CHECKS, *search.CHECKS, *rows.CHECKS,
+    *elsewhere.CHECKS, *near_copies.CHECKS, *rounded.CHECKS, *noise.CHECKS, *priors.CHECKS,
+    *course.CHECKS, *causes.CHECKS, *sides.CHECKS, *regions.CHECKS, *gain.CHECKS, *waves.CHECKS,
 ))  # fmt: skip
 AT_ONCE = tuple(check for check in CHECKS if check.at_once)

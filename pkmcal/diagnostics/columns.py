@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, IntArray, lots
+from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.fitted.fit import Fit
 from pkmcal.readings.predicted import Predicted
 from pkmcal.statistics.score_test import Columns, columns_of
@@ -28,7 +28,7 @@ def of_rows(fit: Fit, change: Change) -> Columns:
     fit : Fit
         The fit.
     change : callable (set, rows, predicted) -> ndarray (b, k, d)
-        How what is read in some rows of a set follows the numbers, given what is predicted of it.
+        How what is read in some rows of a set follows the numbers, given the prediction of these.
     """
     sure = fit.uncertainty
 
@@ -49,8 +49,8 @@ def of_rows(fit: Fit, change: Change) -> Columns:
 def _whitened(fit: Fit, change: Change) -> Iterator[FloatArray]:
     """The changes of all readings, whitened, lot by lot."""
     equations, factors = fit.uncertainty.equations, fit.uncertainty.factors
-    for i, seen in enumerate(equations.prediction.predicted(fit.estimate.evaluation)):
-        for rows in lots(len(seen.values), _TOGETHER):
+    for i in range(len(equations.table.sets)):
+        for rows, seen in equations.prediction.lots_of(i, fit.estimate.evaluation, _TOGETHER):
             part = np.array(change(i, rows, seen))
             yield equations.whitening.whiten_rows(part, i, rows, factors)
 
@@ -97,10 +97,10 @@ def _moved(fit: Fit, twists: Callable[[IntArray], FloatArray]) -> Change:
     table = fit.uncertainty.equations.table
 
     def change(i: int, rows: slice, seen: Predicted) -> FloatArray:
-        found = seen.by_twist[rows] @ twists(table.pose_of[i][rows])
+        found = seen.by_twist @ twists(table.pose_of[i][rows])
         other = table.other_of[i]
         if seen.by_other is not None and other is not None:
-            found = found + seen.by_other[rows] @ twists(other[rows])
+            found = found + seen.by_other @ twists(other[rows])
         return found
 
     return change

@@ -9,6 +9,7 @@ from pkmcal.diagnostics.displaced import DisplacedTarget, displaced_target
 from pkmcal.diagnostics.drift import Drift, drift
 from pkmcal.diagnostics.late import late
 from pkmcal.diagnostics.measuring_order import MeasuringOrder, measuring_order
+from pkmcal.diagnostics.moved_instrument import moved_instrument
 from pkmcal.diagnostics.two_machines import Apart, apart
 from pkmcal.fitted.solution import Solution
 
@@ -45,8 +46,17 @@ CHECKS = (
         say=lambda found, seen: str(seen),
     ),
     Check(
+        name="moved-instrument", about="a camera, a board or another instrument was moved between"
+        " two poses, where these are scattered by actuators",
+        levels=("doubt",), unless=("grave", "follows-loads"),
+        run=lambda found: at_most_one(moved_instrument(found.fit)),
+        level_of=lambda found, seen: "doubt" if seen.found else None,
+        say=lambda found, seen: str(seen),
+    ),
+    Check(
         name="two-machines", about="sets, sessions, halves or other rows fit better apart",
-        unless=("grave", "copies", "displaced-target", "follows-loads"), levels=("doubt", "remark"),
+        unless=("grave", "copies", "displaced-target", "follows-loads", "moved-instrument"),
+        levels=("doubt", "remark"),
         run=lambda found: at_most_one(apart(found)),
         level_of=lambda found, seen: _level(found, seen) if seen.found else None,
         say=lambda found, seen: str(seen),

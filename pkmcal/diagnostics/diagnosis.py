@@ -8,12 +8,11 @@ from typing import Any, get_args
 
 from pkmcal.arguments import instance, kind
 from pkmcal.diagnostics.check import Check, Level, Remedy, Said
-from pkmcal.display import printable
+from pkmcal.display import LONGEST, printable
 from pkmcal.exceptions import ArgumentTypeError
 from pkmcal.fitted.solution import Solution
 
 _LEVELS: tuple[Level, ...] = get_args(Level)
-_LONGEST = 1000  # letters of a sentence: names that a user gave may be in it
 
 
 class Diagnosis:
@@ -69,7 +68,7 @@ class Diagnosis:
                     f"{check.name}: level_of must say {levels} or None; said {level!r}"
                 )
             said = instance(f"{check.name}: what say returns", check.say(found, finding), str)
-            text = printable(said, _LONGEST)
+            text = printable(said, LONGEST)
             yield Said(check.name, level, text, finding, self._remedies(check, finding))
 
     def _remedies(self, check: Check[Any], finding: Any) -> tuple[Remedy, ...]:

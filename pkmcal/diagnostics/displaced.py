@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray
+from pkmcal.diagnostics.check import CHANCE
 from pkmcal.diagnostics.columns import of_rows
 from pkmcal.display import chance_text, displayed, printable
 from pkmcal.estimation.fit_data import Dependence
@@ -22,7 +23,6 @@ from pkmcal.readings.predicted import Predicted
 from pkmcal.statistics.score_test import Columns, Score, score_test
 from pkmcal.statistics.shifts import TOLD_APART
 
-CHANCE = 0.01  # below which a target is said to be displaced
 _LARGE = 0.5  # of the squared residuals, from which they are little else
 
 
@@ -152,7 +152,7 @@ def _columns(fit: Fit, mine: list[BoolArray]) -> Columns:
 
     def change(i: int, rows: slice, seen: Predicted) -> FloatArray:
         if "target" not in seen.by:
-            return np.zeros((*seen.values[rows].shape, 3))
-        return np.where(mine[i][rows, None, None], seen.by["target"][rows], 0.0)
+            return np.zeros((*seen.values.shape, 3))
+        return np.where(mine[i][rows, None, None], seen.by["target"], 0.0)
 
     return of_rows(fit, change)

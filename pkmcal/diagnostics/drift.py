@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.diagnostics.check import CHANCE
 from pkmcal.display import chance_text
 from pkmcal.effects.expansion import stated, temperatures
 from pkmcal.estimation.evaluation import Evaluation
@@ -19,7 +20,6 @@ from pkmcal.measurements.measurements import Measurements
 from pkmcal.statistics.drift_test import LEAST, trend
 from pkmcal.statistics.linear_fit import means, numbered
 
-CHANCE = 0.01  # below which repeats drift
 _HOUR = 3600.0  # s
 
 

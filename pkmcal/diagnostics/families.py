@@ -69,7 +69,8 @@ def unlike_families(found: Solution) -> Iterator[UnlikeFamily]:
             before = _median((start.residuals[i] * arcs)[:, columns])
             if not off > _UNLIKE * other:
                 continue
-            residual, predicted = end.residuals[i][:, columns], end.predicted[i][:, columns]
+            residual = end.residuals[i][:, columns]
+            predicted = equations.prediction.values(end)[i][:, columns]
             gross = off > GROSS * size and off > _KEPT * before
             if gross or _follows(residual, predicted) < _CHANCE:
                 arc = float(arcs[columns[0]])
@@ -92,8 +93,9 @@ def constant_components(found: Solution) -> Iterator[Constant]:
         values = m.values.reshape(len(m), -1)
         names = m.components if len(m.instrument.families) > 1 else ()
         for k, name in enumerate(names):
-            rows = np.isfinite(values[:, k]) & np.isfinite(end.predicted[i][:, k])
-            read, predicted = values[rows, k], end.predicted[i][rows, k]
+            seen = equations.prediction.values(end)[i][:, k]
+            rows = np.isfinite(values[:, k]) & np.isfinite(seen)
+            read, predicted = values[rows, k], seen[rows]
             if len(read) < _LEAST_ROWS or (read != read[0]).any():
                 continue
             if float(np.ptp(predicted)) * equations.arcs[i][k] > _VARIES * size:

@@ -11,15 +11,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray
+from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.diagnostics.check import RARE
 from pkmcal.diagnostics.columns import of_rows
 from pkmcal.diagnostics.visits import visits_of
 from pkmcal.display import chance_text
 from pkmcal.fitted.solution import Solution
 from pkmcal.readings.predicted import Predicted
 from pkmcal.statistics.score_test import Columns, beside
-
-CHANCE = 1e-3  # below which readings are late
 
 
 @dataclass(frozen=True)
@@ -47,7 +46,7 @@ class Late:
     @property
     def found(self) -> bool:
         """True if readings and actuators are of different moments."""
-        return self.chance < CHANCE
+        return self.chance < RARE
 
     def __str__(self) -> str:
         odds = chance_text(self.chance)
@@ -79,13 +78,13 @@ def late(found: Solution) -> Late | None:
         return None
     visits = visits_of(found)
     tested = {
-        leaving: beside(sure.tested, _columns(found, place))
+        leaving: beside(sure.tested, _columns(found, visits.actuators, place))
         for leaving, place in ((False, visits.before), (True, visits.after))
     }
     ways = {leaving: each for leaving, each in tested.items() if each is not None}
     # shared errors make as much more likely: of what is likely without them nothing else is asked
     scores = {
-        leaving: each.score() for leaving, each in ways.items() if len(ways) * each.chance < CHANCE
+        leaving: each.score() for leaving, each in ways.items() if len(ways) * each.chance < RARE
     }
     known = {leaving: score for leaving, score in scores.items() if score is not None}
     if not known:
@@ -96,18 +95,18 @@ def late(found: Solution) -> Late | None:
     return Late(float(score.size[0]), float(score.deviation[0]), chance, leaving)
 
 
-def _columns(found: Solution, place: FloatArray) -> Columns:
-    """Differentiate equations by the share of the way to places (N, n) that readings are off.
+def _columns(found: Solution, actuators: FloatArray, place: IntArray) -> Columns:
+    """Differentiate equations by the share of the way to other places that readings are off.
 
-    The places are actuator readings.
+    The places are actuator readings, rows `place` (N,) of `actuators` (K, n).
     """
     fit = found.fit
     table, end = fit.equations.table, fit.estimate.evaluation
     first = np.cumsum([0, *map(len, table.sets)])
 
     def change(i: int, rows: slice, seen: Predicted) -> FloatArray:
-        way = place[first[i] : first[i + 1]][rows] - table.sets[i].actuators[rows]
+        way = actuators[place[first[i] : first[i + 1]][rows]] - table.sets[i].actuators[rows]
         twists = end.machines.actuator_twists(end.states, table.pose_of[i][rows])
-        return seen.by_twist[rows] @ (twists @ way[:, :, None])
+        return seen.by_twist @ (twists @ way[:, :, None])
 
     return of_rows(fit, change)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pkmcal.arrays import FloatArray
-from pkmcal.diagnostics.check import Check, Remedy, at_most_one
+from pkmcal.diagnostics.check import CHANCE, Check, Remedy, at_most_one
 from pkmcal.diagnostics.columns import of_rows
 from pkmcal.display import chance_text
 from pkmcal.effects.elasticity import Elasticity
@@ -22,7 +22,6 @@ from pkmcal.readings.predicted import Predicted
 from pkmcal.statistics.distributions import t_tail
 from pkmcal.statistics.score_test import Columns, score_test
 
-CHANCE = 0.01  # below which residuals follow the loads, and a compliance is below 0
 _UNSURE = 0.2  # share of a compliance that its standard deviation exceeds where loads are alike
 _OF_LEGS, _OF_JOINTS = Elasticity("offset*"), Elasticity("joint*")
 
@@ -74,7 +73,7 @@ def _by_compliances(fit: Fit, robot: Calibratable) -> Columns:
         place, load = table.pose_of[i][rows], table.sets[i].load
         carrying = soft if load is None else soft.under(Load.of_rows(load[rows]))
         twists = carrying.error_twists(fit.end.pose[place], table.actuators[place])
-        moved: FloatArray = seen.by_twist[rows] @ twists[..., places]
+        moved: FloatArray = seen.by_twist @ twists[..., places]
         return moved
 
     return of_rows(fit, change)

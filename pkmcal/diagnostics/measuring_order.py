@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.diagnostics.check import CHANCE
 from pkmcal.display import chance_text, displayed, printable
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.fitted.fit import Fit
@@ -15,7 +16,6 @@ from pkmcal.fitted.row_names import row_names
 from pkmcal.statistics.linear_fit import means, numbered
 from pkmcal.statistics.order_test import Course, Series
 
-CHANCE = 0.01  # below which residuals follow the order
 _FEWEST = 8  # visits of a series
 _MOST = 0.5  # of the residuals' variance, from which they are little else
 

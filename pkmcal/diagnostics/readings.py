@@ -143,28 +143,6 @@ def _said_of(found: Solution, seen: AtOdds) -> str:
     )
 
 
-def scale_by_one(found: Solution) -> str | None:
-    """Name the one thing that tells how large the machine is; None where there are several."""
-    machine = found.fit.end.robot
-    by = {m.instrument.scaled_by for m in found.fit.uncertainty.equations.table.sets}
-    if len(by) != 1 or "" in by:
-        return None
-    gains = [f"gain{i + 1}" for i, unit in enumerate(machine.actuator_units) if unit == "mm"]
-    return by.pop() if {*gains} <= {*found.free} else None
-
-
-def _of_scale(found: Solution, thing: str) -> str:
-    if f"{thing}.size" in found.free:
-        return (
-            f"nothing that was measured has a length: with the size of the {thing} unknown the"
-            " machine stays as large as drawn; state the size, or measure one distance"
-        )
-    return (
-        f"how large the machine is rests on the {thing} alone: a {thing} that is 0.2 % larger than"
-        " stated makes it 0.2 % larger"
-    )
-
-
 CHECKS = (
     Check(
         name="doubtful-readings", about="readings that contradict what is stated of the instrument",
@@ -174,12 +152,6 @@ CHECKS = (
         name="at-odds", about="pictures of one of several cameras that the other measurements"
         " contradict",
         levels=("doubt",), run=_at_odds, say=_said_of,
-    ),
-    Check(
-        name="scale", about="one thing of stated size that alone tells how large the machine is",
-        levels=("remark", "doubt"), run=lambda found: at_most_one(scale_by_one(found)),
-        say=_of_scale,
-        level_of=lambda found, thing: "doubt" if f"{thing}.size" in found.free else "remark",
     ),
     Check(
         name="hardly-turned", about="poses that are turned alike, where it has to be found what is"

@@ -92,10 +92,11 @@ class _Compared:
         for i, own in enumerate(rows):
             needed[np.flatnonzero(table.set_of == i)[own]] = True
         among = np.flatnonzero(needed[sure.labels.row])
+        predicted = found.fit.equations.prediction.values(end)
         return cls(
             found,
             tuple(m.select(own) for m, own in zip(table.sets, rows, strict=True)),
-            tuple(each[own] for each, own in zip(end.predicted, rows, strict=True)),
+            tuple(each[own] for each, own in zip(predicted, rows, strict=True)),
             tuple(each[own] for each, own in zip(end.residuals, rows, strict=True)),
             replace(
                 white,

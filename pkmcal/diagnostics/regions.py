@@ -7,19 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
-from pkmcal.diagnostics.check import Check, at_most_one
+from pkmcal.diagnostics.check import CHANCE, Check, at_most_one
 from pkmcal.display import chance_text
 from pkmcal.fitted.fit import Fit
 from pkmcal.fitted.solution import Solution
+from pkmcal.statistics.distributions import FEW
 from pkmcal.statistics.left_out import left_out, residuals_left_out
 from pkmcal.statistics.linear_fit import numbered
 from pkmcal.statistics.singular_values import svd
 
-CHANCE = 0.01  # below which regions or sessions that were left out are worse than expected …
 _RATIO = 1.2  # … and by how much
 _STRIPS = 5  # regions, along the direction in which the poses spread most
 _FEWEST = 20  # poses, below which regions say nothing
-_FEW = 10.0  # degrees of freedom
 
 
 @dataclass(frozen=True)
@@ -57,7 +56,7 @@ def cross_validations(found: Solution) -> tuple[CrossValidation, ...]:
     fit = found.fit
     sure = fit.uncertainty
     equations = sure.equations
-    few = len(np.unique(sure.labels.pose)) < _FEWEST or sure.fit.freedom < _FEW
+    few = len(np.unique(sure.labels.pose)) < _FEWEST or sure.fit.freedom < FEW
     if sure.mixed or sure.rounded or few or not sure.labels.length.any():
         return ()
     if found.loss != "linear" or not (fit.end.status == 0).all():

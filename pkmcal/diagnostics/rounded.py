@@ -7,13 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, lots
+from pkmcal.arrays import FloatArray
 from pkmcal.diagnostics.check import Check, Level, Remedy
 from pkmcal.display import displayed
 from pkmcal.estimation.coarse_readings import DITHERED, Coarse
 from pkmcal.estimation.cut_readings import Cut
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.misfits import rounding_of
+from pkmcal.estimation.uncertainty import ROUNDED
 from pkmcal.fitted.row_names import row_names
 from pkmcal.fitted.solution import Solution
 from pkmcal.measurements.measurements import Measurements
@@ -24,7 +25,6 @@ from pkmcal.statistics.steps import LEAST_ROWS, step_of
 _CHANCE = 1e-3  # of residuals as small, were rounding errors independent
 _SIGNAL = 0.5  # of a step: deviation of what a fit changed, below which these errors are alike
 _WIDER = 1.2  # times, from which wider ± are worth a word
-_ROUNDED = 1e3  # times rounding errors of what is predicted
 
 
 # nothing was measured ---------------------------------------------------------------------------
@@ -41,7 +41,7 @@ def _nothing_measured(found: Solution) -> tuple[str, ...]:
         residual = start.residuals[i]
         values = m.values.reshape(residual.shape)
         own = np.array([step_of(values[:, k], unit) for k, unit in enumerate(m.units)])
-        limit = _half(m, own) + reach[i] + _ROUNDED * rounding_of(m, start.robot.length)
+        limit = _half(m, own) + reach[i] + ROUNDED * rounding_of(m, start.robot.length)
         off = np.stack(
             [_but_for_a_shift(*each) for each in zip(values.T, residual.T, strict=True)], axis=1
         )
@@ -81,14 +81,14 @@ def _reach_of_actuators(found: Solution, at: Evaluation) -> list[FloatArray]:
     read = equations.table.actuators
     half = np.array([0.5 * step_of(read[:, a], unit) for a, unit in enumerate(units)])
     table, reach = equations.table, []
-    for i, seen in enumerate(equations.prediction.predicted(at)):
-        whole, other = np.empty(seen.values.shape), table.other_of[i]
-        for rows in lots(len(whole)):
+    for i, residual in enumerate(at.residuals):
+        whole, other = np.empty(residual.shape), table.other_of[i]
+        for rows, seen in equations.prediction.lots_of(i, at):
             twists = at.machines.actuator_twists(at.states, table.pose_of[i][rows])
-            whole[rows] = np.abs(seen.by_twist[rows] @ twists) @ half
+            whole[rows] = np.abs(seen.by_twist @ twists) @ half
             if other is not None and seen.by_other is not None:
                 twists = at.machines.actuator_twists(at.states, other[rows])
-                whole[rows] += np.abs(seen.by_other[rows] @ twists) @ half
+                whole[rows] += np.abs(seen.by_other @ twists) @ half
         reach.append(whole)
     return reach
 
@@ -138,7 +138,8 @@ def _alike(found: Solution, coarse: Coarse) -> bool:
     """Return whether rounding errors go together: they do not average out then."""
     if not coarse.residual < DITHERED * coarse.floor:
         return False  # noise spreads the readings over several steps
-    start, end = (each.predicted[coarse.set] for each in (found.fit.start, found.fit.end))
+    values, fit = found.fit.equations.prediction.values, found.fit
+    start, end = (values(each)[coarse.set] for each in (fit.start, fit.end))
     changed = (end - start)[:, coarse.component]
     if float(np.std(changed[np.isfinite(changed)])) < _SIGNAL * coarse.step:
         return True

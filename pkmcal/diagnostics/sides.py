@@ -13,13 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import BoolArray
-from pkmcal.diagnostics.check import Check, Level, at_most_one
+from pkmcal.diagnostics.check import RARE, Check, Level, at_most_one
 from pkmcal.diagnostics.two_machines import equations_of_visits, fit_of, tested
 from pkmcal.diagnostics.visits import visits_of
 from pkmcal.display import chance_text
 from pkmcal.fitted.solution import Solution
 
-CHANCE = 1e-3  # below which the two sides are of different numbers
 _FAR = 1.5  # times what noise lets expect, above which ± do not hold
 _TRAVEL = 1e-3  # of the machine's length, from which poses have sides
 _WAYS = (
@@ -89,7 +88,7 @@ def _groups(found: Solution) -> Iterator[tuple[str, BoolArray]]:
 
 
 def _level(found: Solution, seen: Sides) -> Level | None:
-    if seen.chance >= CHANCE:
+    if seen.chance >= RARE:
         return None
     return "doubt" if seen.ratio > _FAR else "remark"
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, IntArray
+from pkmcal.diagnostics.check import RARE
 from pkmcal.diagnostics.reach import reach
 from pkmcal.diagnostics.visits import Visits, visits_of
 from pkmcal.display import chance_text, first_rows, printable
@@ -20,10 +21,9 @@ from pkmcal.estimation.uncertainty import Uncertainty
 from pkmcal.fitted.solution import Solution
 from pkmcal.statistics.distributions import f_tail
 from pkmcal.statistics.group_test import Groups, few_equations, group_test, within_reach
-from pkmcal.statistics.linear_fit import ROUNDING, LinearFit, column_basis, numbered, reweighted
+from pkmcal.statistics.linear_fit import ROUNDING, LinearFit, numbered, orthonormal, reweighted
 from pkmcal.statistics.two_regressions import best_division
 
-CHANCE = 1e-3  # below which a group of rows is of another machine
 _LARGE = 0.8  # times the residuals, above which errors of a model may be as large
 _FAR = 0.7  # times the residuals, below which rows in no order, or elsewhere, are of another
 _MOST = 300  # visits of which such rows are looked for
@@ -63,7 +63,7 @@ class Apart:
     @property
     def found(self) -> bool:
         """True if the rows are of another machine."""
-        return self.chance < CHANCE
+        return self.chance < RARE
 
     def __str__(self) -> str:
         if self.elsewhere:
@@ -220,7 +220,8 @@ def _elsewhere(found: Solution, mine: BoolArray, visits: Visits) -> bool:
     """
     table = found.fit.equations.table
     first = np.unique(numbered(visits.series, visits.visit), return_index=True)[1]
-    actuators = np.concatenate([m.actuators for m in table.sets])
+    every = [m.actuators for m in table.sets]
+    actuators = every[0] if len(every) == 1 else np.concatenate(every)
     tried = [(actuators[first], mine[first])]
     if len(table.sets) == 1:
         subject = table.sets[0].instrument.subject(len(mine))
@@ -234,16 +235,17 @@ def _elsewhere(found: Solution, mine: BoolArray, visits: Visits) -> bool:
 def _explained(columns: FloatArray, mine: BoolArray) -> bool:
     """Return whether columns (N, k) explain who belongs to a group, much and not by chance."""
     belongs = mine - mine.mean()
-    columns = columns[:, (columns != columns[0]).any(axis=0)]
+    columns = columns[:, (columns != columns[0]).any(axis=0)].astype(np.float64, copy=False)
     if not columns.size or not belongs.any():
         return False
-    basis = column_basis(columns - columns.mean(axis=0))
-    ways = basis.shape[1]
+    columns -= columns.mean(axis=0)
+    along = (belongs @ columns) @ orthonormal(columns)
+    ways = len(along)
     freedom = max(1, len(mine) - ways - 1)
-    missing = 1.0 - float(((basis.T @ belongs) ** 2).sum() / (belongs**2).sum())
+    missing = 1.0 - float((along**2).sum() / (belongs**2).sum())
     ratio = (1.0 - missing) / ways * freedom / max(missing, ROUNDING)
     much = 1.0 - missing * (len(mine) - 1) / freedom > _APART
-    return much and f_tail(ratio, ways, freedom) < CHANCE
+    return much and f_tail(ratio, ways, freedom) < RARE
 
 
 def _groups(found: Solution, visits: Visits) -> Iterator[tuple[str, BoolArray]]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.arrays import FloatArray, IntArray, held_once
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.fitted.solution import Solution
 from pkmcal.statistics.linear_fit import numbered
@@ -25,16 +25,19 @@ class Visits:
         Which.
     visit, visits : ndarray of int (N,)
         Which visit of it each row is, from 0, and how many it has.
-    before, after : ndarray (N, n)
-        Where the actuators were at the visit before, and at the next; where they are at the first
-        and at the last.
+    actuators : ndarray (K, n)
+        Where the actuators were, of all rows, fitted and held out.
+    before, after : ndarray of int (N,)
+        Which of these were at the visit before, and at the next; at the first and at the last they
+        are those of the visit itself.
     """
 
     series: IntArray
     visit: IntArray
     visits: IntArray
-    before: FloatArray
-    after: FloatArray
+    actuators: FloatArray
+    before: IntArray
+    after: IntArray
 
 
 def visits_of(found: Solution) -> Visits:
@@ -50,23 +53,31 @@ def visits_of(found: Solution) -> Visits:
         for data in sets
     ])  # fmt: skip
     row = np.concatenate([data.rows for data in sets])
-    actuators = np.concatenate([data.measured.actuators for data in sets])
+    every = [data.measured.actuators for data in sets]
+    actuators = every[0] if len(every) == 1 else np.concatenate(every)
     order = np.lexsort((row, time, series))
-    q, of = actuators[order], series[order]
+    of = series[order]
     first = np.diff(of, prepend=-1) != 0
     new = first.copy()
-    new[1:] |= (q[1:] != q[:-1]).any(axis=1)
+    for each in actuators.T:
+        q = each[order]
+        new[1:] |= q[1:] != q[:-1]
     number = np.cumsum(new) - 1  # of all visits
     begins = np.flatnonzero(new)
     start = number[first][of]  # the first visit of each series
-    previous = q[begins[np.maximum(number - 1, start)]]
+    previous = order[begins[np.maximum(number - 1, start)]]
     count = np.bincount(of[new])[of]
-    coming = q[begins[np.minimum(number + 1, start + count - 1)]]
+    coming = order[begins[np.minimum(number + 1, start + count - 1)]]
     back = np.empty_like(order)
     back[order] = np.arange(len(order))
     fitted = back[: len(found.rows)]
     return Visits(
-        of[fitted], (number - start)[fitted], count[fitted], previous[fitted], coming[fitted]
+        held_once(of[fitted]),
+        (number - start)[fitted],
+        held_once(count[fitted]),
+        actuators,
+        previous[fitted],
+        coming[fitted],
     )
 
 

@@ -110,7 +110,7 @@ class MachineExpansion:
     name: ClassVar[str] = "expansion"
 
     def dependences(self, measured: Measurements) -> Iterator[Dependence]:
-        """Return no coefficients: those of expansion are exact."""
+        """Return no coefficients to be found: those of expansion are given and exact."""
         return iter(())
 
     def of_rows(self, measured: Measurements) -> Growth:
@@ -170,7 +170,7 @@ def stated(effects: Sequence[object]) -> dict[str, float]:
 
 def has_lengths(robot: Calibratable) -> TypeGuard[Robot]:
     """Return whether a machine's numbers are lengths, so that their growth is known."""
-    return robot.kind == "parallel" and robot.model.chains is None and not robot.model.driven
+    return robot.model.closed_form and not robot.model.driven
 
 
 def _named(given: float | Mapping[str, float], limbs: int) -> Mapping[str, float]:

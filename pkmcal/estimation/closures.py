@@ -87,23 +87,23 @@ class ExactActuators:
         return RowStates(solved.pose, self.read, solved.status)
 
     def moved(self, robot: Calibratable, states: RowStates, step: FloatArray) -> RowStates:
-        """Nothing moves."""
+        """Return the poses as they are: nothing moves them."""
         return states
 
     def residual(self, robot: Calibratable, states: RowStates) -> tuple[FloatArray, FloatArray]:
-        """No equations."""
+        """Return no equations: actuators are exact."""
         return np.empty((len(self.read), 0)), np.empty((len(self.read), 0, 0))
 
     def lengths(self, robot: Calibratable) -> FloatArray:
-        """No equations."""
+        """Return no equations: actuators are exact."""
         return np.empty(0)
 
     def twists(self, robot: Calibratable, states: RowStates) -> FloatArray:
-        """No unknowns."""
+        """Return no unknowns: actuators are exact."""
         return np.empty((len(self.read), 6, 0))
 
     def by_numbers(self, robot: Calibratable, states: RowStates, places: IntArray) -> FloatArray:
-        """No equations."""
+        """Return no equations: actuators are exact."""
         return np.empty((len(self.read), 0, len(places)))
 
     def twists_by_numbers(

@@ -19,7 +19,7 @@ import numpy as np
 from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.core.elimination import PoseEquations
 from pkmcal.estimation.evaluation import Evaluation
-from pkmcal.estimation.prediction import Prediction
+from pkmcal.estimation.prediction import EVERY, Prediction
 from pkmcal.estimation.row_states import RowStates
 from pkmcal.estimation.sessions import NONE
 from pkmcal.estimation.whitening import Whitening
@@ -115,10 +115,11 @@ class RowsInLots:
         width, (rows, k) = self.equations.unknowns, whitening.read[i].shape
         values, columns = np.empty((rows, k)), np.empty((rows, k, width))
         for (mine, _), part in zip(self.parts, shared, strict=True):
-            values[mine] = part.values
-            columns[mine, :, :MOTION] = part.by_motion
+            at = slice(None) if len(mine) == rows else mine
+            values[at] = part.values
+            columns[at, :, :MOTION] = part.by_motion
             for name, place in self._places.items():
-                columns[mine, :, place] = part.own[name][:, :, self.own[name]]
+                columns[at, :, place] = part.own[name][:, :, self.own[name]]
         residual = measured.instrument.difference(measured.values, values)
         columns[:, :, -1] = residual
         white = whitening.whiten_alone(columns, i)
@@ -191,6 +192,13 @@ class CompressedPrediction(Prediction):
         ]
         return own.triangles(i, shared, measured, self.whitening)
 
+    def seen(
+        self, pose: FloatArray, theta: FloatArray
+    ) -> tuple[tuple[FloatArray, ...], tuple[FloatArray, ...]]:
+        """Return what is predicted of the rows (N, k) of each set, and measured less that."""
+        found = self.at(pose, theta)
+        return self.of_rows(found), self.residuals(found)
+
     def of_rows(self, predicted: Sequence[Predicted]) -> tuple[FloatArray, ...]:
         """Return the predicted values of the rows (N, k) of each set."""
         return tuple(
@@ -215,17 +223,17 @@ class CompressedPrediction(Prediction):
         """Return `misfits_of` at an evaluation."""
         return self.misfits_of(self.predicted(evaluation))
 
-    def predicted(self, evaluation: Evaluation) -> tuple[Predicted, ...]:
-        """Predict the readings at an evaluation, which keeps them."""
-        owner, _ = evaluation.cache.get("predicted", (None, ()))
-        if owner is not self:
-            found = self.at(evaluation.pose, evaluation.theta)
-            evaluation.cache["predicted"] = self, found
-        return super().predicted(evaluation)
+    def _known(self, evaluation: Evaluation) -> tuple[Predicted, ...]:
+        """The predicted readings at an evaluation, which keeps them."""
+        known = super()._known(evaluation)
+        if known is None:
+            known = self.at(evaluation.pose, evaluation.theta)
+            evaluation.cache["predicted"] = self, known
+        return known
 
-    def by_geometry(self, i: int, evaluation: Evaluation) -> FloatArray | None:
+    def by_geometry(self, i: int, evaluation: Evaluation, rows: slice = EVERY) -> FloatArray | None:
         """Derivative to numbers of the geometry at held poses; of lots there is none."""
-        return None if self.lots[i] is not None else super().by_geometry(i, evaluation)
+        return None if self.lots[i] is not None else super().by_geometry(i, evaluation, rows)
 
 
 def compressed(

@@ -9,7 +9,7 @@ from pkmcal.geometry.elastic import COMPLIANCE, is_elastic
 from pkmcal.kinematics.loaded import LoadedMachine
 from pkmcal.kinematics.robot import Robot
 
-_MOTIONS = 14  # as `pkmcal.estimation.gauges` has them: six of the base, the scale, six, forces
+MOTIONS = 14  # that readings may not notice: six of the base, the scale, six, forces
 _LENGTHS = ("centre.", "balancer", "payload.centre.", "payload.moment.")
 _STEP = 1e-6  # rad of a tilt: of central differences
 
@@ -27,7 +27,7 @@ def elastic_motions(robot: Robot, platform: int, scale: int, forces: int) -> dic
         if not is_elastic(number.name):
             continue
         name, value = number.name, geometry[number.name]
-        change = np.zeros(_MOTIONS)
+        change = np.zeros(MOTIONS)
         change[scale], change[forces] = _scales(name, number.unit, value)
         stem, _, axis = name.rpartition(".")
         if stem.endswith(".platform"):

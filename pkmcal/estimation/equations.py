@@ -145,7 +145,7 @@ class Equations:
 
     @cached_property
     def compressed(self) -> Equations | None:
-        """Fewer equations of the same squares; None where there are none.
+        """Fewer equations with these sums of squares; None where none are fewer.
 
         What they have at an evaluation is what these have but for rounding: squares, derivatives
         by the parameters and their products, degrees of freedom. Of rows by themselves they say
@@ -203,6 +203,14 @@ class Equations:
             return self
         return replace(self, prediction=replace(self.prediction, parameters=parameters))
 
+    def with_more(self, datasets: Sequence[FitData], parameters: Parameters) -> Equations:
+        """The equations of the same rows by further parameters, weighted as these are."""
+        table = self.table.with_parameters(datasets, parameters)
+        if table is not None:
+            return replace(self, prediction=Prediction.of(datasets, parameters, table), whole=None)
+        equations = Equations.of(datasets, parameters).reweighted(self.whitening.deviations)
+        return replace(equations, blocks=self.blocks)  # slack cables count in neither
+
     def with_tension(self, tension: FloatArray | None) -> Equations:
         """The equations under tensions (K, n) of what the actuators drive; None: as they are."""
         if tension is None:
@@ -254,19 +262,14 @@ class Equations:
             factors = np.ones(len(self.blocks.unstated)) if noise is None else noise
             states, system = self.system.best(machines, states, theta, factors)
             cache["system"] = self.system, factors, system
-        predicted = self.prediction.at(states.pose, theta)
         if len(self.table.rows) <= _TOGETHER:
+            predicted = self.prediction.at(states.pose, theta)
             cache["predicted"] = self.prediction, predicted
-        return Evaluation(
-            theta,
-            self.parameters,
-            machines,
-            states,
-            self.prediction.of_rows(predicted),
-            self.prediction.residuals(predicted),
-            self._begun(near),
-            cache,
-        )
+            residuals = self.prediction.residuals(predicted)
+        else:
+            _, residuals = self.prediction.seen(states.pose, theta)
+        begun = self._begun(near)
+        return Evaluation(theta, self.parameters, machines, states, residuals, begun, cache)
 
     def kept(self, evaluation: Evaluation) -> Evaluation:
         """An evaluation by other equations of the same rows, as by these."""

@@ -42,8 +42,6 @@ class Evaluation:
         With their geometry.
     states : RowStates
         Where the machine is at each distinct row of actuators; NaN where it cannot be.
-    predicted : tuple of ndarray (N, k)
-        What the instruments show there, of each set of measurements.
     residuals : tuple of ndarray (N, k)
         Measured less predicted of each set, mm and rad.
     begun : RowStates
@@ -56,7 +54,6 @@ class Evaluation:
     parameters: Parameters
     machines: Machines
     states: RowStates
-    predicted: tuple[FloatArray, ...]
     residuals: tuple[FloatArray, ...]
     begun: RowStates
     cache: Cache = field(default_factory=Cache, repr=False)
@@ -91,5 +88,5 @@ class Evaluation:
 
     @property
     def robot(self) -> Calibratable:
-        """The machine; that of the last session where some of its numbers are of sessions."""
+        """The machine, as it is in the last session where numbers differ by session."""
         return self.machines.robots[-1]

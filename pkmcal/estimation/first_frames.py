@@ -149,7 +149,7 @@ def _seen(
     """Return readings of set `i` in the base frame, (N, k), with tools that are aligned."""
     columns = prediction.columns[i].get("tool")
     if columns is None:
-        return evaluation.predicted[i][rows]
+        return prediction.values(evaluation)[i][rows]
     pose = evaluation.pose[prediction.table.pose_of[i][rows]]
     for first in np.unique(columns[rows, 0]).tolist():
         mine = columns[rows, 0] == first

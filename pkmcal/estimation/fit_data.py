@@ -49,7 +49,7 @@ class FitData:
     effects: tuple[Effect, ...] = ()
 
     def select(self, chosen: IntArray | BoolArray) -> FitData:
-        """Some of the rows."""
+        """Return the data of some of the rows."""
         return replace(self, measured=self.measured.select(chosen), rows=self.rows[chosen])
 
     @property

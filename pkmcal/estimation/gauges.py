@@ -14,7 +14,7 @@ import numpy as np
 from pkmcal.arrays import FloatArray
 from pkmcal.core.library import AXES, SLOTS
 from pkmcal.estimation.chain_gauges import frame_motions
-from pkmcal.estimation.elastic_gauges import elastic_motions
+from pkmcal.estimation.elastic_gauges import MOTIONS, elastic_motions
 from pkmcal.estimation.parameters import Parameters
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.load import AT, CELL, FORCE
@@ -26,7 +26,6 @@ _OUTSIDE = 1e-6  # share of a motion outside what may move that does not count
 _AXES = ("x", "y", "z")
 _BASE, _SCALE, _PLATFORM = 0, 6, 7  # first columns of the motions: shifts, turns; the common scale
 _FORCES = 13  # the scale of forces
-_MOTIONS = 14
 _MIXED = 1e-3  # of a motion: what is none of its own
 _OFFSET = SLOTS.index("offset")
 _SCALED = [SLOTS.index(name) for name in SLOTS if "tilt" not in name]  # gains too
@@ -49,7 +48,7 @@ def gauges(
     robot = as_parallel(parameters.robot)
     if not unidentifiable.shape[1] or robot is None:
         return (), unidentifiable
-    if robot.model.chains is not None:  # whose numbers are errors of joints, not places of points
+    if not robot.model.closed_form:  # whose numbers are errors of joints, not places of points
         found, free = frame_motions(parameters, robot, unidentifiable)
         rest = np.linalg.svd(found, full_matrices=True)[0][:, found.shape[1] :]
         of_all = np.pad(np.insert(free, _SCALE, 0.0, axis=0), ((0, 1), (0, 0)))
@@ -90,7 +89,7 @@ def _motions(robot: Robot) -> FloatArray:
     """
     slots, limbs = robot.slots, robot.model.limbs
     balanced = robot.model.balanced_load is not None
-    change = np.zeros((*slots.shape, _MOTIONS))
+    change = np.zeros((*slots.shape, MOTIONS))
     over = range(len(SLOTS), robot.model.own_width, 3)
     of_base = [0, *over]  # the first of the three numbers of each point
     middle = slots[:, 0:3].mean(axis=0)
@@ -116,13 +115,13 @@ def _motions(robot: Robot) -> FloatArray:
             key = number.slot.removeprefix("drive.")
             if key != number.slot or key == "gain":
                 grows = not (turns and key in ("gain", "quadratic"))
-                change.reshape(-1, _MOTIONS)[place, _SCALE] = slots.flat[place] * grows
+                change.reshape(-1, MOTIONS)[place, _SCALE] = slots.flat[place] * grows
             if key == "stretch":  # of no length
-                change.reshape(-1, _MOTIONS)[place, _SCALE] = 0.0
-                change.reshape(-1, _MOTIONS)[place, _FORCES] = -slots.flat[place] * balanced
+                change.reshape(-1, MOTIONS)[place, _SCALE] = 0.0
+                change.reshape(-1, MOTIONS)[place, _FORCES] = -slots.flat[place] * balanced
     if robot.model.elastic is not None:
         for place, moved in elastic_motions(robot, _PLATFORM, _SCALE, _FORCES).items():
-            change.reshape(-1, _MOTIONS)[place] = moved
+            change.reshape(-1, MOTIONS)[place] = moved
     return change
 
 
@@ -154,7 +153,7 @@ def _swivel_zeros(parameters: Parameters, robot: Robot) -> dict[int, FloatArray]
         name = f"angle.swivel{i + 1}.zero"
         for k, own in enumerate(parameters.names):
             if own.partition("@")[0] == name:
-                found[k] = np.zeros(_MOTIONS)
+                found[k] = np.zeros(MOTIONS)
                 found[k][3:6] = _tilts(robot, i)["base"][2]
     return found
 
@@ -166,12 +165,12 @@ def _of_load(parameters: Parameters, robot: Robot) -> dict[int, FloatArray]:
         return {}
     frames = [robot.model.base_frame, robot.model.tool_frame]
     base, tool = (np.eye(4) if frame is None else from_pose(frame) for frame in frames)
-    by = {name: np.zeros(_MOTIONS) for name in load.units}
+    by = {name: np.zeros(MOTIONS) for name in load.units}
     force = np.array(load.force) @ base[:3, :3]  # in the machine's own frame
     turned = base[:3, :3] @ np.cross(np.eye(3), force).T
     # the tool is where the platform's frame is, seen from the user's
     at = np.array(load.at) @ tool[:3, :3].T + tool[:3, 3]
-    moved = np.zeros((6, _MOTIONS))
+    moved = np.zeros((6, MOTIONS))
     _move(moved, np.concatenate([np.zeros(3), at]), 3, _PLATFORM, middle)
     moved[3:, _SCALE] = at
     for k, axis in enumerate("xyz"):
@@ -185,7 +184,7 @@ def _of_load(parameters: Parameters, robot: Robot) -> dict[int, FloatArray]:
 
 def _texts(free: FloatArray, yields: bool = False) -> list[str]:
     """Motions (14, d) in words."""
-    alone = [k for k in range(_MOTIONS) if np.linalg.norm(free[k]) > 1.0 - _MIXED]
+    alone = [k for k in range(MOTIONS) if np.linalg.norm(free[k]) > 1.0 - _MIXED]
     texts = []
     for first, moves, where in (
         (_BASE, "the base frame may be", "nothing that was measured says where it stands"),

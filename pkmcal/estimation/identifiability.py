@@ -22,7 +22,7 @@ _KINDS = 4  # kinds of parameters whose combinations are looked for
 _NUISANCE = re.compile(r"(frame|target|anchor|tool|mounting|touch|run)[^.]*\.")
 _OUTSIDE = 1e-5  # share of a combination outside some parameters that does not count
 _TOGETHER = 512  # supports that are looked at at once
-_ALIKE = 1e-3  # share by which entries of a combination differ that are not equal
+ALIKE = 1e-3  # share by which numbers of a combination differ that are as good as equal
 _SURE = 6  # decimals of a coefficient that are more than rounding
 _LEAST = 0.01  # coefficient that is printed
 _MOST = 24  # terms that are printed
@@ -262,7 +262,7 @@ def _reduced(basis: FloatArray) -> FloatArray:
     """Eliminate: each combination has a parameter that the others are without."""
     pivots = _pivots(basis)
     reduced = np.linalg.solve(basis[pivots].T, basis.T).T
-    largest = [first_largest(sizes, _ALIKE * float(sizes.max())) for sizes in np.abs(reduced).T]
+    largest = [first_largest(sizes, ALIKE * float(sizes.max())) for sizes in np.abs(reduced).T]
     scaled: FloatArray = reduced / reduced[largest, np.arange(len(pivots))]
     return scaled
 
@@ -276,7 +276,7 @@ def _pivots(basis: FloatArray) -> list[int]:
     rest, pivots = np.linalg.qr(basis).Q, list[int]()
     for _ in range(basis.shape[1]):
         sizes = np.linalg.norm(rest, axis=1)
-        pivots.append(first_largest(sizes, _ALIKE * float(sizes.max())))
+        pivots.append(first_largest(sizes, ALIKE * float(sizes.max())))
         along = rest[pivots[-1]] / sizes[pivots[-1]]
         rest -= np.outer(rest @ along, along)
     return pivots

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, IntArray
+from pkmcal.arrays import BoolArray, IntArray, held_once
 from pkmcal.estimation.equations import Equations
 from pkmcal.measurements import repeats
 from pkmcal.measurements.poses import joined
@@ -88,21 +88,14 @@ def _of_readings(equations: Equations) -> Labels:
     read = equations.whitening.present
     row = np.concatenate(rows)[read]
     return Labels(
-        set_of=_once(equations.table.set_of[row]),
+        set_of=held_once(equations.table.set_of[row]),
         row=row,
         pose=poses_of_rows(equations)[row],
-        target=_once(np.concatenate(targets)[read]),
+        target=held_once(np.concatenate(targets)[read]),
         component=np.concatenate(components)[read],
-        family=_once(np.concatenate(families)[read]),
+        family=held_once(np.concatenate(families)[read]),
         length=np.concatenate(lengths)[read],
     )
-
-
-def _once(numbers: IntArray) -> IntArray:
-    """The numbers (M,), which are in memory once where all are the same."""
-    if not (numbers == numbers[:1]).all():
-        return numbers
-    return np.broadcast_to(numbers[:1].copy(), numbers.shape)
 
 
 def _of_mixtures(equations: Equations) -> Labels:

@@ -34,7 +34,7 @@ def mirror_fits(equations: Equations, evaluation: Evaluation, noise: FloatArray)
     robot, parameters = as_parallel(evaluation.robot), equations.parameters
     if robot is None or not equations.machines.unknowns:
         return False
-    if robot.model.chains is not None or robot.model.map not in _DIMENSIONS:
+    if not robot.model.closed_form or robot.model.map not in _DIMENSIONS:
         return False
     names = parameters.names
     if any(name.startswith(("base", "over", "platform")) and "@" in name for name in names):

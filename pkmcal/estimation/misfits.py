@@ -11,18 +11,16 @@ from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.pose_system import PoseSystem
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.readings.predicted import Predicted
 
 _ROUNDING = 2e-15  # of the largest value: the error of a solved pose
 
 
-def worst_readings(equations: Equations, predicted: Sequence[Predicted]) -> FloatArray:
-    """Return the worst reading of each pose, mm (K,), of what is predicted; inf without a pose.
+def worst_readings(equations: Equations, residuals: Sequence[FloatArray]) -> FloatArray:
+    """Return the worst reading of each pose, mm (K,), of measured less predicted; inf without one.
 
     Angles count as their arc. NaN where nothing was read.
     """
     worst = np.full(len(equations.table.actuators), np.nan)
-    residuals = equations.prediction.residuals(predicted)
     for m, mm, place, residual in zip(
         equations.table.sets, equations.mm, equations.table.pose_of, residuals, strict=True
     ):

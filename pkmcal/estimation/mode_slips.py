@@ -24,7 +24,7 @@ _LEAST = 1e-3  # mm; misfits of measurements without noise
 _HALF = 0.5  # of the misfit that another mode may leave
 _FITTING = 4.0  # times what is gross, beyond which no mode fits
 _NEIGHBOURS = 6  # rows from whose poses a machine is solved whose modes are not known
-_MOST = 0.5  # share of the poses that may miss grossly: of more, something else is wrong
+MOST_ODD = 0.5  # share of the poses that may miss grossly: of more, something else is wrong
 
 
 def in_their_modes(equations: Equations, evaluation: Evaluation) -> Evaluation:
@@ -69,13 +69,13 @@ def _better(equations: Equations, evaluation: Evaluation) -> tuple[IntArray, Flo
     if as_parallel(evaluation.robot) is None:
         return none  # an arm has one pose
     prediction = equations.prediction
-    misfit = worst_readings(equations, prediction.predicted(evaluation))
+    misfit = worst_readings(equations, evaluation.residuals)
     solved, read = np.isfinite(misfit), ~np.isnan(misfit)
     if not solved.any():
         return none
     limit = max(_GROSS * float(np.median(misfit[solved])), _LEAST)
     gross = np.flatnonzero(read & ~(misfit <= limit))
-    if not 0 < len(gross) <= _MOST * np.count_nonzero(read):
+    if not 0 < len(gross) <= MOST_ODD * np.count_nonzero(read):
         return none
     least, best = np.where(solved, misfit, np.inf), pose.copy()
     modes = [
@@ -92,7 +92,7 @@ def _better(equations: Equations, evaluation: Evaluation) -> tuple[IntArray, Flo
         trial = pose.copy()
         for k, of_row in zip(gross, modes, strict=True):
             trial[k] = of_row[j] if j < len(of_row) else np.nan
-        now = worst_readings(equations, prediction.at(trial, evaluation.theta))
+        now = worst_readings(equations, prediction.seen(trial, evaluation.theta)[1])
         nearer = now < least
         least, best = np.where(nearer, now, least), np.where(nearer[:, None], trial, best)
     fits = (least < _HALF * np.where(solved, misfit, np.inf)) & (least <= _FITTING * limit)

@@ -13,7 +13,7 @@ from typing import Literal
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray, IntArray
+from pkmcal.arrays import BoolArray, FloatArray, IntArray, held_once
 from pkmcal.core.poses import compose, compose_rates
 from pkmcal.estimation.fit_data import FRAME, Dependence, FitData
 from pkmcal.estimation.own_residuals import Residual, at_parameters, residual_name
@@ -251,7 +251,7 @@ class Parameters:
             if session is not None:
                 names, mine = (each.tolist() for each in np.unique(session, return_inverse=True))
             parts = [place.setdefault((name, behind), len(place)) for name in names]
-            part_of.append(np.array(parts, dtype=np.intp)[mine])
+            part_of.append(held_once(np.array(parts, dtype=np.intp)[mine]))
         columns = np.array([
             [
                 self.column.get((number, label(scope, *part)), NONE)

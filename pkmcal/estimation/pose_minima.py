@@ -19,15 +19,15 @@ from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.estimate import Estimate
 from pkmcal.estimation.estimator import Estimator
 from pkmcal.estimation.evaluation import Evaluation
+from pkmcal.estimation.mode_slips import MOST_ODD
 from pkmcal.kinematics.calibratable import as_parallel
 from pkmcal.kinematics.robot import Robot
 
 _ANGLES = POSE[3:]
 _ODD = 3.0  # times the median mean square from which a pose is looked for again
 _SOUND = 9.0  # times it, below which a minimum is taken for the true one
-_TOLD_APART = 2.0 * np.log(100.0)  # mean squares: a minimum so much lower has odds of 100 to 1
+TOLD_APART = 2.0 * np.log(100.0)  # of squares in units of their variance: odds of 100 to 1
 _TURN = 0.6  # rad, either way about each axis that the platform turns about
-_MOST = 0.5  # share of the poses that may be odd: of more, something else is wrong
 _ROUNDS = 5  # of fitting anew from poses that were found
 
 
@@ -66,7 +66,7 @@ def in_least_minima(
         states = evaluation.onward.at_poses(lost, begun[lost])
         there = equations.at(evaluation.theta, noise, states)
         now = squares_of_poses(equations, there, factors)[lost]
-        lower = now < squares[lost] - _TOLD_APART * usual
+        lower = now < squares[lost] - TOLD_APART * usual
         better = lost[lower & (now <= _SOUND * usual * freedom[lost])]
         found[better] = there.pose[better]
         lost = np.setdiff1d(lost, better)
@@ -99,7 +99,7 @@ def _odd(squares: FloatArray, freedom: IntArray) -> tuple[IntArray, float]:
         return np.empty(0, dtype=np.intp), np.inf
     usual = float(np.median(squares[seen] / freedom[seen]))
     odd = np.flatnonzero(squares > _ODD * usual * freedom)
-    return (odd if len(odd) <= _MOST * len(squares) else odd[:0]), usual
+    return (odd if len(odd) <= MOST_ODD * len(squares) else odd[:0]), usual
 
 
 def _elsewhere(robot: Robot, pose: FloatArray) -> Iterator[FloatArray]:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.arrays import FloatArray, IntArray, held_once
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.parameters import Parameters
 from pkmcal.estimation.tensioned_poses import Cells, cells_of, check_cells
@@ -88,6 +88,22 @@ class PoseTable:
         machines = range(len(self.machine_columns))
         return tuple(np.flatnonzero(self.machine_of_pose == s) for s in machines)
 
+    def with_parameters(
+        self, datasets: Sequence[FitData], parameters: Parameters
+    ) -> PoseTable | None:
+        """The table of the same rows by other parameters; None where its poses are others.
+
+        That is where machines of sessions differ that did not, or the reverse.
+        """
+        columns, part_of = parameters.columns_of(datasets)
+        machine_columns, machine_of = _machines(columns[:, : len(parameters.places)], part_of)
+        pairs = zip(machine_of, self.pose_of, strict=True)
+        if len(machine_columns) != len(self.machine_columns) or not all(
+            np.array_equal(of_row, self.machine_of_pose[pose]) for of_row, pose in pairs
+        ):
+            return None
+        return replace(self, columns=columns, part_of=part_of, machine_columns=machine_columns)
+
 
 def pose_table(datasets: Sequence[FitData], parameters: Parameters) -> PoseTable:
     """Find the distinct poses of the rows.
@@ -131,8 +147,8 @@ def pose_table(datasets: Sequence[FitData], parameters: Parameters) -> PoseTable
     return PoseTable(
         sets=sets,
         rows=rows,
-        set_of=np.repeat(np.arange(len(sets)), count),
-        count=np.concatenate(read),
+        set_of=held_once(np.repeat(np.arange(len(sets)), count)),
+        count=held_once(np.concatenate(read)),
         pose_of=tuple(place[: len(count)]),
         other_of=tuple(None if m.other is None else next(there) for m in sets),
         actuators=of_pose["actuators"],
@@ -143,7 +159,7 @@ def pose_table(datasets: Sequence[FitData], parameters: Parameters) -> PoseTable
         columns=columns,
         part_of=part_of,
         machine_columns=machine_columns,
-        machine_of_pose=machine[first],
+        machine_of_pose=held_once(machine[first]),
         command_of_pose=command_of_pose,
     )
 

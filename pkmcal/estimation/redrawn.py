@@ -28,9 +28,10 @@ def redrawn(
         change, errors = equations.system.redrawn(at, noise, reduced)
         machines = machines.shifted(change)
     residuals = tuple(equations.whitening.unwhiten(errors, noise))
+    predicted = equations.prediction.values(at)
     sets = tuple(
         replace(m, values=m.instrument.corrected(values, residual).reshape(m.values.shape))
-        for m, values, residual in zip(equations.table.sets, at.predicted, residuals, strict=True)
+        for m, values, residual in zip(equations.table.sets, predicted, residuals, strict=True)
     )
     parameters = replace(equations.parameters, start=prior_centre, drawn=drawn)
     prediction = replace(

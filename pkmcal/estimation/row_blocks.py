@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray, IntArray
+from pkmcal.arrays import BoolArray, FloatArray, IntArray, held_once
 from pkmcal.estimation.elimination import Elimination
 from pkmcal.estimation.pose_table import PoseTable
 from pkmcal.estimation.session_machines import Machines
@@ -116,10 +116,10 @@ def row_blocks(table: PoseTable, unstated: BoolArray, missing: int) -> RowBlocks
     """Find the blocks of readings; `missing` rows had been left out, for nothing was read there."""
     read = table.count > 0
     return RowBlocks(
-        components=table.count[read],
+        components=held_once(table.count[read]),
         pose_of_block=np.concatenate(table.pose_of)[read],
         block_of_row=np.where(read, np.cumsum(read) - 1, -1),
-        family_of_block=table.set_of[read],
+        family_of_block=held_once(table.set_of[read]),
         unstated=unstated,
         uninformative=missing + int((~read).sum()),
     )

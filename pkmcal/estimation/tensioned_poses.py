@@ -18,7 +18,6 @@ from pkmcal.display import first_rows
 from pkmcal.estimation.closures import FreePoses, machine_of, one_mm
 from pkmcal.estimation.row_states import RowStates
 from pkmcal.exceptions import ArgumentError
-from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.load import CELL, CableLoad
 from pkmcal.kinematics import pose_steps
 from pkmcal.kinematics.calibratable import Calibratable
@@ -244,10 +243,8 @@ def _hindrance(robot: Calibratable) -> str:
     """Why tensions of a machine cannot be unknowns; "" where they can."""
     if robot.kind == "arm":
         return "it is a serial arm"
-    if robot.model.chains is not None:
-        return "its limbs are chains of joints"
     for i, limb in enumerate(robot.model.limbs):
-        if not KINDS[limb.kind].cable:
+        if not limb.cable:
             return f"limb {i + 1} is a {limb.kind}, no cable"
     if robot.n_actuators < len(robot.model.limbs):
         return "limbs share an actuator"

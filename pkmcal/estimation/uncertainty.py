@@ -29,7 +29,7 @@ from pkmcal.statistics.linear_fit import (
 from pkmcal.statistics.noise import Noise, Split, joined, noise, split
 from pkmcal.statistics.variance_components import told_apart, variance_components
 
-_ROUNDED = 1e3  # times rounding errors, below which residuals are nothing else
+ROUNDED = 1e3  # times errors of rounding, below which residuals may be nothing else
 
 
 def stated_variances(measured: Measurements, family: int = 0) -> FloatArray | None:
@@ -110,14 +110,14 @@ class Uncertainty:
         beside others: without noise of their own, rounding alone is much of them.
         """
         residual = self.fit.residual
-        if np.linalg.norm(residual) >= _ROUNDED * rounding(self.equations, self.factors):
+        if np.linalg.norm(residual) >= ROUNDED * rounding(self.equations, self.factors):
             return False
         use = self.fit.without_idle(np.arange(len(residual)))
         readings = self.equations.system is None and self.equations.whole is None
         if not readings or not len(use) or len(use) == len(residual):
             return True
         errors = rounding_of_readings(self.equations, self.factors)[use]
-        return bool(np.linalg.norm(residual[use]) < _ROUNDED * np.linalg.norm(errors))
+        return bool(np.linalg.norm(residual[use]) < ROUNDED * np.linalg.norm(errors))
 
     @property
     def mixed(self) -> bool:

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray, IntArray, lots
+from pkmcal.arrays import BoolArray, FloatArray, IntArray, held_once, lots
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.readings import orientation
 
@@ -48,7 +48,7 @@ class Whitening:
         """Whitening by the sigma of the sets, on a machine of this length in mm."""
         every = np.arange(len(sets))
         return cls(
-            tuple(_whitening(m, length) for m in sets),
+            tuple(held_once(_whitening(m, length)) for m in sets),
             tuple(np.isfinite(m.values).reshape(len(m), -1) for m in sets),
             tuple(np.ones(len(m.components)) for m in sets),
             tuple(np.full(len(m.components), i) for i, m in enumerate(sets)),
@@ -101,7 +101,7 @@ class Whitening:
 
     def reweighted(self, deviations: Sequence[FloatArray]) -> Whitening:
         """Give the components (k,) of each set other relative deviations."""
-        white = [each / by for each, by in zip(self.white, deviations, strict=True)]
+        white = [held_once(each / by) for each, by in zip(self.white, deviations, strict=True)]
         return replace(self, white=tuple(white), deviations=tuple(deviations))
 
     def whitened(self, parts: Sequence[FloatArray], noise: FloatArray) -> FloatArray:
@@ -127,7 +127,7 @@ class Whitening:
 
     def whiten_alone(self, part: FloatArray, i: int) -> FloatArray:
         """Whiten all numbers (N, k, ...) of set `i` as they are stated, in their memory."""
-        self._whiten(part, i, slice(None), np.ones(len(self.white)))
+        self._as_stated(part, i, slice(None))
         return part
 
     def stacked(self, part: FloatArray, i: int, rows: slice) -> FloatArray:
@@ -139,6 +139,11 @@ class Whitening:
         return stacked
 
     def _whiten(self, part: FloatArray, i: int, rows: slice, noise: FloatArray) -> None:
+        self._as_stated(part, i, rows)
+        of_components = noise[self.groups[i]]
+        part /= of_components.reshape(-1, *(1,) * (part.ndim - 2))
+
+    def _as_stated(self, part: FloatArray, i: int, rows: slice) -> None:
         white = self.white[i][rows]
         if not self.complete:
             np.nan_to_num(part, copy=False, nan=0.0)
@@ -146,8 +151,6 @@ class Whitening:
             part[:] = np.einsum("nij,nj...->ni...", white, part)
         else:
             part *= white.reshape(*white.shape, *(1,) * (part.ndim - 2))
-        of_components = noise[self.groups[i]]
-        part /= of_components.reshape(-1, *(1,) * (part.ndim - 2))
 
     def unwhiten(self, whitened: FloatArray, noise: FloatArray) -> list[FloatArray]:
         """Invert `whitened` for vectors (M,): parts (N, k) of all sets, mm and rad.
@@ -183,7 +186,8 @@ def _whitening(measured: Measurements, length: float) -> FloatArray:
     """Factors (N, k) or matrices (N, k, k) that make the noise one; 1 mm where it is not known."""
     sigma = measured.sigma
     if sigma is None:
-        return np.tile(measured.instrument.mm(measured, length), (len(measured), 1))
+        mm = measured.instrument.mm(measured, length)
+        return np.tile(mm, (len(measured), 1))
     first = measured.instrument.turning
     if first is not None and not _same_turnings(sigma, first):
         sigma = orientation.covariance(sigma, np.nan_to_num(measured.values[:, first:]))

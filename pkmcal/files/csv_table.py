@@ -38,7 +38,7 @@ from pkmcal.files.xlsx_rows import xlsx_rows
 
 _UNSEEN = ("-", "--", "---", "n/a", "na", "nan", "null", "none", "#n/a", "?")
 _LONGEST = 60  # letters of a line in a note
-_SHOWN = 8  # names of columns in a message
+SHOWN = 8  # names of columns in a message
 
 
 @dataclass(frozen=True)
@@ -302,8 +302,8 @@ class Table:
         """An error that a column is not there; `otherwise` is said where none was left out."""
         hint = otherwise
         if self.left_out:
-            named = ", ".join(map(repr, list(self.left_out)[:_SHOWN]))
-            more = ", …" if len(self.left_out) > _SHOWN else ""
+            named = ", ".join(map(repr, list(self.left_out)[:SHOWN]))
+            more = ", …" if len(self.left_out) > SHOWN else ""
             number = re.findall(r"\d+", name)[-1:]
             alike = [
                 each for each in self.left_out if number and re.findall(r"\d+", each) == number

@@ -35,7 +35,7 @@ class WrittenColumn(NamedTuple):
 
     @property
     def heading(self) -> str:
-        """Name and unit."""
+        """Heading of the column: its name and unit."""
         return f"{self.name} [{self.unit}]" if self.unit else self.name
 
     def cells(self) -> list[str]:

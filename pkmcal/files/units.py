@@ -7,6 +7,8 @@ import re
 from collections.abc import Collection, Iterable
 
 # What one unit is in mm, in rad: (multiply by, divide by), so that 1 um is 1/1000 mm exactly.
+INCH = 25.4  # mm
+METRE = 1000.0  # mm
 UNITS: dict[str, dict[str, tuple[float, float]]] = {
     "mm": {
         "mm": (1.0, 1.0),

@@ -19,7 +19,7 @@ from pkmcal.arrays import BoolArray, FloatArray, first_largest
 from pkmcal.estimation.estimate import Estimate
 from pkmcal.estimation.estimator import Estimator
 from pkmcal.estimation.evaluation import Evaluation
-from pkmcal.estimation.identifiability import decompose, listed
+from pkmcal.estimation.identifiability import ALIKE, decompose, listed
 from pkmcal.estimation.parameters import Asked, Parameters
 from pkmcal.kinematics.calibratable import as_parallel
 from pkmcal.kinematics.workspace import sample_poses
@@ -32,7 +32,6 @@ DATUM = "datum"  # the word that `fix` takes for them
 _POSES, _SHARE = 60, 0.7  # at which twists are compared, and how far out
 _POINTS = ("target", "attachment", "anchor")  # what a reading depends on and a frame moves
 _OUTSIDE = 1e-6  # share of a combination outside some others that does not count
-_ALIKE = 1e-3  # share by which numbers differ that are as good to hold
 _FAMILIAR = 0.1  # of the best number's: a coordinate is held that has as much
 _SAME_POINT = 2.0  # how much rather another coordinate of the same point is held
 
@@ -192,7 +191,7 @@ def _still(twists: FloatArray, length: float, *frames: FloatArray) -> FloatArray
 
 
 def _basis(columns: FloatArray) -> FloatArray:
-    """Orthonormal columns of the same space."""
+    """Return orthonormal columns that span what the columns of a matrix span."""
     left, singular, _ = svd(columns)
     basis: FloatArray = left[:, singular > _OUTSIDE]
     return basis
@@ -222,7 +221,7 @@ def _held(free: FloatArray, names: tuple[str, ...], allowed: BoolArray) -> list[
         wanted = np.where(familiar & (sizes > _FAMILIAR * best), 1.0 / _FAMILIAR, 1.0)
         wanted[np.isin(point, point[held])] *= _SAME_POINT
         wanted *= sizes
-        held.append(first_largest(wanted, _ALIKE * float(wanted.max())))
+        held.append(first_largest(wanted, ALIKE * float(wanted.max())))
         along = rest[held[-1]] / sizes[held[-1]]
         rest = rest - np.outer(rest @ along, along)
     return held

@@ -47,7 +47,7 @@ class Problem:
     slack: tuple[Cell, ...] = ()
 
     def of(self, equations: Equations) -> Problem:
-        """Other equations, from the same start."""
+        """Return a fit of other equations, which begins where this one began."""
         return replace(self, equations=equations, exact=equations.with_exact_actuators())
 
 

@@ -26,7 +26,7 @@ from pkmcal.statistics.distributions import t_factor
 from pkmcal.statistics.linear_fit import triangle
 from pkmcal.statistics.prior_test import LEAST_FREEDOM, PriorTest, left_alone, prior_test
 
-_INVOLVED = 1e-6  # share of a parameter in unidentifiable combinations from which it is one
+INVOLVED = 1e-6  # share of a parameter in unidentifiable combinations from which it is one
 
 
 def parameter_table(
@@ -36,7 +36,7 @@ def parameter_table(
     chosen, theta = estimator.equations.parameters, estimate.evaluation.theta
     rates = chosen.reported_rates(theta) * chosen.scale
     along = rates @ estimate.state.determined.unidentifiable
-    unknown = np.linalg.norm(along, axis=1) > _INVOLVED * chosen.scale
+    unknown = np.linalg.norm(along, axis=1) > INVOLVED * chosen.scale
     unknown |= uncertainty.freedom <= 0  # nothing shows the deviation
     rank, size = estimate.state.determined.rank, chosen.robot.length
     held = rates @ held_errors(estimate.triangle, estimate.prior, rank, size)

@@ -117,9 +117,8 @@ def _held(
     new = [more.names.index(name) for name in names]
 
     def columns() -> Iterator[tuple[slice, FloatArray]]:
-        equations = Equations.of(sets, more).reweighted(fitted.whitening.deviations)
-        equations = replace(equations, blocks=fitted.blocks)  # slack cables count in neither
-        evaluation = equations.at(theta_of(more, chosen, end.theta), sure.factors, end.states)
+        equations, theta = fitted.with_more(sets, more), theta_of(more, chosen, end.theta)
+        evaluation = equations.at(theta, sure.factors, end.states)
         for _, rows, some in equations.batches(evaluation, sure.factors):
             yield rows, some[:, new]
 

@@ -18,6 +18,7 @@ from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.free_parameters import parameters
 from pkmcal.estimation.parameters import Parameters
 from pkmcal.fitted.fit import Fit
+from pkmcal.fitted.fit_statistics import INVOLVED
 from pkmcal.statistics.leave_out import LeftOut, leave_out
 from pkmcal.statistics.linear_fit import numbered
 from pkmcal.statistics.score_test import Columns, columns_of
@@ -25,7 +26,6 @@ from pkmcal.statistics.score_test import Columns, columns_of
 LEAST_GAIN = 0.05  # share of the rms at poses left out that an effect must take away
 LEAST_T = 2.0  # of the paired differences by pose
 LEAST_POSES = 8
-_INVOLVED = 1e-6  # share of a number in combinations that are not determined
 
 
 @dataclass(frozen=True)
@@ -155,7 +155,7 @@ def _shift(fit: Fit, chosen: Parameters, plain: LeftOut, whole: LeftOut, kept: B
             moved[place[name]] = by
     determined = np.linalg.norm(np.linalg.qr(fit.uncertainty.fit.back)[0], axis=1)
     deviation = np.sqrt(np.maximum(np.diag(fit.uncertainty.scaled), 0.0))
-    known = np.isfinite(deviation) & (deviation > 0.0) & (determined > 1.0 - _INVOLVED)
+    known = np.isfinite(deviation) & (deviation > 0.0) & (determined > 1.0 - INVOLVED)
     return float(np.sqrt(np.mean((moved[known] / deviation[known]) ** 2))) if known.any() else 0.0
 
 

@@ -14,7 +14,7 @@ from pkmcal.arrays import FloatArray, propagate
 from pkmcal.fitted.fit import Fit
 from pkmcal.kinematics.calibratable import as_given, as_machine
 
-_NEGLIGIBLE = 1e-3  # mm a pose moves per mm along an undetermined combination
+UNDETERMINED = 1e-3  # mm a pose or target moves per mm along an undetermined combination
 _TOLD = 1e-9  # of the largest, a singular value of the motions of frames
 
 
@@ -46,7 +46,7 @@ def machine_accuracy(fit: Fit, places: FloatArray, reference: FloatArray) -> Flo
     variance = propagate(alone, fit.covariance[np.ix_(own, own)])
     undetermined = (fit.undetermined() * fit.parameters.scale[:, None])[own]
     moved = np.linalg.norm(alone @ undetermined, axis=(1, 2))
-    return np.where(moved < _NEGLIGIBLE, np.sqrt(variance), np.inf)
+    return np.where(moved < UNDETERMINED, np.sqrt(variance), np.inf)
 
 
 def _rates(fit: Fit, places: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray, IntArray, largest_first, lots
+from pkmcal.arrays import TIED_CLOSELY, BoolArray, FloatArray, IntArray, largest_first, lots
 from pkmcal.statistics.robust_scale import median_ratio
 
-_FALSE_ALARM = 0.01  # chance of naming any row at all where the noise is as stated
-_ALIKE = 1e-9  # share by which rows are further off than others that are not equally far off
+FALSE_ALARM = 0.01  # chance of naming any row, or slack cable, where the noise is as stated
 LARGE = 20  # components of a row that has an opinion of its own on how precise it is
 _FEW = 8  # such rows, from which on their scatter can be told
 _DEVIATION = 1.4826  # of a normal distribution in units of the median distance
@@ -85,17 +84,22 @@ def outliers(
         spread = max(median_ratio(squares[kept], components[kept]), 1.0 if stated else _NONE)
         freedom = _freedom(squares, components, kept, LARGE if stated else 1)
         scale = _median(freedom) / (_median(components) * spread)
-        chance = _chance(squares * scale, freedom)
+        known = np.inf
+        if not stated:
+            known = _known(
+                components[kept], float(np.trace(covariance @ (normal - prior.T @ prior)))
+            )
+        chance = _chance(squares * scale, freedom, known)
         # where the chance is 0 to the last digit, the squares decide; they exceed its logarithm
         excess = np.where(chance > 0, -np.log(np.maximum(chance, _NONE)), squares)
         excess = np.where(kept, np.maximum(excess, 0.0), -1.0)
         allowed = rows // _MOST + 1 - np.count_nonzero(~kept)
         worst = _worst(excess, own, min(max(rows // _AT_ONCE, 1), allowed))
-        worst = worst[chance[worst] < _FALSE_ALARM / rows]
+        worst = worst[chance[worst] < FALSE_ALARM / rows]
         kept[worst] = False
         if len(worst) in (0, allowed):
             break
-    odd: IntArray = np.flatnonzero(~kept & (chance < _FALSE_ALARM / rows))
+    odd: IntArray = np.flatnonzero(~kept & (chance < FALSE_ALARM / rows))
     return odd
 
 
@@ -106,7 +110,7 @@ def _worst(excess: FloatArray, own: FloatArray, most: int) -> IntArray:
     """
     largest = float(excess.max())
     some = np.flatnonzero(excess >= _AS_ODD * largest)
-    order = some[largest_first(excess[some], _ALIKE * largest)]
+    order = some[largest_first(excess[some], TIED_CLOSELY * largest)]
     return np.concatenate([order[:1], order[1:][own[order[1:]] < _OWN]])[:most]
 
 
@@ -150,8 +154,26 @@ def _freedom(squares: FloatArray, components: IntArray, kept: BoolArray, least: 
     return found
 
 
-def _chance(squares: FloatArray, components: FloatArray) -> FloatArray:
-    from scipy.special import gammaincc
+def _known(components: IntArray, taken: float) -> float:
+    """Degrees of freedom of a variance by the median of rows with so many equations each.
 
-    chance: FloatArray = gammaincc(components / 2, squares / 2)
-    return chance
+    As many as make it scatter so; `taken` of the equations are met by the parameters.
+    """
+    from scipy.special import gammaln
+
+    usual, rows = float(np.median(components)), len(components)
+    half, median = usual / 2.0, float(_median(np.asarray(usual)))
+    density = np.exp((half - 1.0) * np.log(median / 2.0) - median / 2.0 - gammaln(half)) / 2.0
+    left = 1.0 - taken / float(components.sum())
+    return max(float(8.0 * rows * (density * median) ** 2 * left), 1.0)
+
+
+def _chance(squares: FloatArray, freedom: FloatArray, known: float) -> FloatArray:
+    """Chance of squares, over a variance that is known with so many degrees of freedom."""
+    from scipy.special import fdtrc, gammaincc
+
+    if np.isinf(known):
+        chance: FloatArray = gammaincc(freedom / 2, squares / 2)
+        return chance
+    estimated: FloatArray = fdtrc(freedom, known, squares / freedom)
+    return estimated

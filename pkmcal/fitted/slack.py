@@ -19,21 +19,24 @@ from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.estimate import Estimate
 from pkmcal.estimation.estimator import Estimator
 from pkmcal.estimation.evaluation import Evaluation
-from pkmcal.estimation.pose_minima import in_least_minima, solved_in_least_minima, squares_of_poses
+from pkmcal.estimation.pose_minima import (
+    TOLD_APART,
+    in_least_minima,
+    solved_in_least_minima,
+    squares_of_poses,
+)
 from pkmcal.exceptions import ArgumentError
-from pkmcal.geometry.limb_kinds import KINDS
+from pkmcal.fitted.outliers import FALSE_ALARM
 from pkmcal.kinematics.calibratable import Calibratable, as_parallel
 from pkmcal.kinematics.robot import Robot
 from pkmcal.statistics.robust_scale import median_ratio
 
 _LISTED = 3  # cables that a warning names
-_FALSE_ALARM = 0.01  # chance of calling any cable slack where all are taut
 _ROUNDS = 10  # of leaving cables out and fitting anew
 _TOO_SHORT = 4.0  # deviations by which a reading is shorter than a slack cable's can be
 _SEEN = 1e-6  # degrees of freedom from which an equation's residual shows anything
 _ALIKE = 1e-3  # share by which squares differ that cannot be told apart
 _ROUNDING = 1e-6  # share by which they differ that are equal
-_TOLD_APART = 2.0 * np.log(100.0)  # squares: what explains so much less has odds of 1 to 100
 
 
 @dataclass(frozen=True)
@@ -82,7 +85,7 @@ def _slack_cells(estimator: Estimator, estimate: Estimate) -> list[Cell]:
     for pose, own, sign in zip(odd.tolist(), gain, longer > 0.0, strict=True):
         # if one that is too short explains more, something else is wrong with this row
         most = own.max()
-        alike = sign & (own >= most - max(_TOLD_APART * width, _ALIKE * most))
+        alike = sign & (own >= most - max(TOLD_APART * width, _ALIKE * most))
         if most > limit and alike.any() and pulling[alike].all():
             first = first_largest(np.where(alike, own, -np.inf), _ROUNDING * most)
             others = (k for k in np.flatnonzero(alike).tolist() if k != first)
@@ -104,7 +107,7 @@ def _odd_poses(equations: Equations, estimate: Estimate) -> tuple[IntArray, floa
         return np.empty(0, dtype=np.intp), np.inf, np.inf
     standard = np.where(seen, longer**2 / np.where(seen, redundancy, 1.0), 0.0)
     width = max(1.0, median_ratio(standard[seen], np.ones(used, dtype=np.intp)))
-    limit = float(ndtri(_FALSE_ALARM / used) ** 2 * width)
+    limit = float(ndtri(FALSE_ALARM / used) ** 2 * width)
     return np.flatnonzero(standard.max(axis=1) > limit), limit, width
 
 
@@ -207,11 +210,11 @@ def listed_slack(cables: Sequence[SlackCable]) -> str:
 def _pulling(equations: Equations) -> BoolArray:
     """Mark closures of cables, (equations,)."""
     robot = as_parallel(equations.parameters.robot)
-    if robot is None or robot.model.chains is not None:
+    if robot is None or not any(limb.cable for limb in robot.model.limbs):
         return np.zeros(equations.machines.equations, dtype=bool)
     home = robot.inverse(robot.home)[None]
     slope = robot.machine.slopes(robot.slots, home)[0]
-    cables = np.array([KINDS[limb.kind].cable for limb in robot.model.limbs])
+    cables = np.array([limb.cable for limb in robot.model.limbs])
     of_limbs = _of_limbs(robot)
     pulling = [
         bool(cables[mine].all()) and abs(np.sign(slope[mine]).sum()) == mine.sum()
@@ -226,7 +229,7 @@ def _slopes(equations: Equations, evaluation: Evaluation) -> FloatArray:
 
     def slopes(machine: Calibratable, poses: IntArray) -> FloatArray:
         found, robot = np.ones((len(poses), len(actuators))), as_parallel(machine)
-        if robot is None or robot.model.chains is not None:
+        if robot is None or not robot.model.closed_form:
             return found
         slope = robot.machine.slopes(robot.slots, equations.table.actuators[poses])
         for k, a in enumerate(actuators):

@@ -10,7 +10,7 @@ import numpy as np
 from pkmcal.arrays import FloatArray, Unit, furthest_axis
 from pkmcal.geometry.laws import Law
 
-ERRORS = ("dx", "dy", "dz", "dphi", "dtheta", "dpsi")  # as of serial arms
+ERRORS = ("dx", "dy", "dz", "dphi", "dtheta", "dpsi")  # of a joint, also of a serial arm: mm, rad
 BY_MAP: dict[str, tuple[str, ...]] = {  # what can be wrong in a group
     "spatial": ERRORS,
     "planar": ("dx", "dy", "dpsi"),

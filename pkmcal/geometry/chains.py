@@ -8,8 +8,9 @@ three R of which only the place can be wrong.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
@@ -27,6 +28,7 @@ from pkmcal.geometry.chain_joints import (
     frame_of,
 )
 from pkmcal.geometry.laws import LawNumber, gain_unit
+from pkmcal.geometry.mechanism import StatedDrive
 from pkmcal.geometry.ties import LimbNumber
 from pkmcal.screw import from_pose
 
@@ -35,7 +37,7 @@ _DEPENDENT = 1e-7  # of the largest singular value: the least is none
 
 @dataclass(frozen=True, eq=False)
 class Chains:
-    """The limbs of a machine of chains.
+    """The limbs of a machine of chains, as `pkmcal.geometry.mechanism.Mechanism`.
 
     Attributes
     ----------
@@ -54,6 +56,19 @@ class Chains:
     home: FloatArray
     limbs: tuple[tuple[Joint, ...], ...]
     tail: int = 0
+
+    closed_form: Literal[False] = field(default=False, init=False)
+    key_of_drives: Literal["joints"] = field(default="joints", init=False)
+
+    @property
+    def apart(self) -> bool:
+        """True if no passive joint is of several limbs and none behind the platform."""
+        return not (self.layout.shared or self.tail)
+
+    @property
+    def loose(self) -> bool:
+        """True if limbs hold each other by joints that they share."""
+        return self.layout.loose
 
     @property
     def n_actuators(self) -> int:
@@ -86,8 +101,52 @@ class Chains:
                     found.setdefault(joint.actuator, (i, joint))
         return tuple(found[a] for a in sorted(found))
 
-    def table(self) -> Table:
-        """Every joint, from the base to the platform, in the base frame, the machine at home."""
+    @property
+    def stated_drives(self) -> tuple[StatedDrive, ...]:
+        """The drive of each actuator."""
+        return tuple(
+            StatedDrive(a, joint.law, joint.unit, joint.stroke, limb)
+            for a, (limb, joint) in enumerate(self.actuated)
+        )
+
+    @property
+    def first_drives(self) -> tuple[int, ...]:
+        """The first actuator of each limb before the platform, counted from 0; -1 of none."""
+        return tuple(
+            next((j.actuator for j in limb[: len(limb) - self.tail] if j.actuator is not None), -1)
+            for limb in self.limbs
+        )
+
+    @property
+    def passive_names(self) -> tuple[str, ...]:
+        """The passive joints, by their coordinates in the core."""
+        names, coordinate = list(self.parts), self.layout.coordinate
+        order = sorted(range(len(names)), key=lambda k: int(coordinate[k]))
+        return tuple(names[k] for k in order if coordinate[k] >= 0)
+
+    @property
+    def read_at_home(self) -> FloatArray:
+        """The ways of the drives at home."""
+        return self.layout.zero
+
+    def row_actuators(self, rows: int) -> list[int]:
+        """Return the actuator of each closure: first one of each, then those of passive joints."""
+        return [*range(self.n_actuators), *[-1] * (rows - self.n_actuators)]
+
+    def characteristic_length(self, slots: FloatArray) -> float:
+        """Return `length`, whatever the errors of the joints."""
+        return self.length
+
+    def extent(self, slots: FloatArray, home: FloatArray) -> float:
+        """Return `size`, whatever the errors of the joints."""
+        return self.size
+
+    def base_points(self, slots: FloatArray) -> FloatArray:
+        """Return the first joint of each limb, (limbs, 3), mm."""
+        return np.array([limb[0].at for limb in self.limbs])
+
+    def table(self, slots: FloatArray) -> Table:
+        """Return every joint from the base to the platform, in the base frame, at home."""
         rows = []
         for i, limb in enumerate(self.limbs, 1):
             for k, joint in enumerate(limb, 1):

@@ -46,7 +46,7 @@ def read_controller(table: Table) -> Controller:
 
 
 def controller_table(controller: Controller) -> dict[str, str]:
-    """The table of it."""
+    """The ``[controller]`` table of a robot file."""
     return {"firmware": controller.firmware} | (
         {"file": controller.file} if controller.file else {}
     )

@@ -179,3 +179,33 @@ KINDS: dict[str, LimbKind] = {
 
 # Other names of a kind; T is the Hooke (universal) joint.
 ALIASES: dict[str, str] = {"TPS": "UPS", "SPS": "UPS", "TPR": "UPR"}
+
+# What each key of a ``[[limb]]`` table states, as `pkmcal new` explains it; {kinds}: the kinds.
+KEYS = {
+    "kind": "{kinds}",
+    "actuator": "number of the q that drives it, if not its own: several limbs may name one",
+    "base": "its joint on the base: [x, y, z], or {{ radius = …, angle = …, z = … }}",
+    "platform": "its joint on the platform, in the platform's frame",
+    "slider": "direction of the carriage's travel, of any length",
+    "normal": "of the plane that the limb stays in",
+    "revolute": "axis of its joint on the platform, in the platform's frame",
+    "universal": "first axis of its joint on the base, with couple",
+    "couple": "a length: makes its second constraint count too",
+    "weights": "of its constraints beside the length",
+    "over": "further points from which parts of the cable run to the platform: [[x, y, z], …]",
+    "parts": "how many parts run from base, and from each point under over",
+    "swivel": "axis of the pulley, along which the cable runs onto it, at base",
+    "radius": "of the pulley's groove",
+    "axis": "of the crank, at base",
+    "zero": "where the crank points at 0, or the pulley's swivel",
+    "crank": "length of the crank",
+    "rod": "length from carriage or crank to the platform joint",
+    "offset, gain": "the drive is at gain · q + offset; 0 and 1 if left out",
+    "branch": "which of the two places that a rod can lead to: 1 or -1",
+    "stiffness, rod_stiffness": "N/mm of the leg or the screw, N m/rad of the crank; of the rod",
+    "mass, anchor_mass": "kg: of leg or rod, half of it at each end; of the carriage",
+    "drive": "law of a drive with a shape: quadratic, spool, harmonics, table, backlash",
+    "stroke": "least and most of gain · q + offset",
+    "base_cone": "{{ axis = …, angle = … }}: how far its joint on the base swings",
+    "platform_cone": "{{ axis = …, angle = … }}: how far its joint on the platform swings",
+}

@@ -4,124 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
-
-import numpy as np
+from functools import cached_property
 
 from pkmcal.arrays import FloatArray, Unit
 from pkmcal.core.laws import Drive, Laws
 from pkmcal.core.library import SLOTS
-from pkmcal.display import Table, fixed
+from pkmcal.display import Table
 from pkmcal.geometry.box import Box
 from pkmcal.geometry.chains import Chains
 from pkmcal.geometry.controller import Controller
-from pkmcal.geometry.drivers import Driver
 from pkmcal.geometry.elastic import Elastic, is_elastic
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.laws import Law, drive
-from pkmcal.geometry.limb_kinds import KINDS
+from pkmcal.geometry.limbs import Limb, Limbs
 from pkmcal.geometry.load import CableLoad
+from pkmcal.geometry.mechanism import Mechanism
 from pkmcal.geometry.stated_uncertainty import NOTHING, StatedUncertainty
-
-CHAIN = "chain"  # the kind of a limb that is a chain of joints: see `pkmcal.geometry.chains`
-
-
-@dataclass(frozen=True, eq=False)
-class Cone:
-    """Limit of a joint: the limb stays within `angle` of `axis`.
-
-    The direction that is limited runs from the base joint (the carriage, the crank's end) to the
-    platform joint, seen in base axes for a base cone and in platform axes for a platform cone.
-
-    Attributes
-    ----------
-    axis : ndarray (3,)
-        Unit vector.
-    angle : float
-        Half the cone's opening, rad.
-    """
-
-    axis: FloatArray
-    angle: float
-
-
-@dataclass(frozen=True, eq=False)
-class Limb:
-    """One limb, apart from its numbers, which are in the geometry.
-
-    Attributes
-    ----------
-    kind : str
-        A name of `pkmcal.geometry.limb_kinds.KINDS`, or `CHAIN`.
-    actuator : int
-        Which actuator drives it, counted from 0; limbs may share one. Of a chain the first of its
-        actuators, or -1 where it has none.
-    branch : int
-        +1 or -1, the sign of u·∂c/∂q̃ with u from carriage to platform joint; 0 where the kind
-        has no branches.
-    frames : mapping of str to ndarray (3, 3)
-        Of each axis of the core (`pkmcal.core.AXES`) that the kind has: orthonormal and
-        right-handed, columns e1 e2 e3. e3 is the stated reference of the slider, the crank's axis,
-        the normal, the universal or the revolute joint's axis; e1 is the crank's direction at
-        q̃ = 0 and otherwise chosen from e3.
-    couple : float
-        Length λ of the couple row in mm; 0 without that row.
-    weights : tuple of float
-        Of the rows beside the sphere row, in the order of ``LimbKind.all_rows``.
-    stroke : tuple of float or None
-        Limits of q̃; mm or rad.
-    base_cone, platform_cone : Cone or None
-        Limits of the joints.
-    parts : tuple of int
-        How many parts of a cable run from each of its points to the platform; of a tackle.
-    law : Law or None
-        What lies between the actuator's reading and q̃ beside gain and offset; of chains their
-        joints have it.
-    """
-
-    kind: str
-    actuator: int
-    branch: int
-    frames: Mapping[str, FloatArray]
-    couple: float = 0.0
-    weights: tuple[float, ...] = ()
-    stroke: tuple[float, float] | None = None
-    base_cone: Cone | None = None
-    platform_cone: Cone | None = None
-    law: Law | None = None
-    parts: tuple[int, ...] = ()
-
-    @property
-    def driver(self) -> Driver | None:
-        """Driver of its kind; None of a chain, whose joints say how it is moved."""
-        return None if self.kind == CHAIN else KINDS[self.kind].driver
-
-    @property
-    def frame(self) -> FloatArray:
-        """Frame of the base axis; the identity where unused."""
-        return self.frames.get("base", np.eye(3))
-
-    @property
-    def platform_frame(self) -> FloatArray:
-        """Frame of the platform axis; the identity where unused."""
-        return self.frames.get("platform", np.eye(3))
-
-    def for_core(self) -> dict[str, Any]:
-        """The limb as `pkmcal.core.machine.Machine` takes it."""
-        kind = KINDS[self.kind]
-        rows = kind.all_rows(self.couple > 0)
-        return {
-            "driver": kind.driver.name,
-            "rows": rows,
-            "actuator": self.actuator,
-            "branch": self.branch,
-            "angle": kind.actuator_unit == "rad",
-            "near": np.nan if self.stroke is None else sum(self.stroke) / 2,
-            "frames": self.frames,
-            "lever": self.couple,
-            "parts": self.parts,
-            "weights": [1.0, *(self.weights or [1.0] * len(rows))],
-        }
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,27 +116,31 @@ class Model:
         """The load that tensions of a calibration's rows balance; None: they need not."""
         return self.load if self.load is not None and self.load.balance else None
 
+    @cached_property
+    def mechanism(self) -> Mechanism:
+        """The limbs as their kind answers for them."""
+        return Limbs(self.limbs) if self.chains is None else self.chains
+
+    @property
+    def closed_form(self) -> bool:
+        """True if limbs are in closed form, and their numbers are places and lengths."""
+        return self.mechanism.closed_form
+
     @property
     def n_actuators(self) -> int:
         """Number of actuators."""
-        if self.chains is not None:
-            return self.chains.n_actuators
-        return 1 + max(limb.actuator for limb in self.limbs)
+        return 1 + max((each.actuator for each in self.mechanism.stated_drives), default=-1)
 
     @property
     def actuator_units(self) -> tuple[Unit, ...]:
         """Unit of each actuator coordinate, "mm" or "rad"."""
-        if self.chains is not None:
-            return tuple(joint.unit for _, joint in self.chains.actuated)
-        units = {limb.actuator: KINDS[limb.kind].actuator_unit for limb in self.limbs}
+        units = {each.actuator: each.unit for each in self.mechanism.stated_drives}
         return tuple(units[i] for i in range(self.n_actuators))
 
     @property
     def laws(self) -> tuple[Law | None, ...]:
         """The law of each drive: of each limb, or of each actuator of chains."""
-        if self.chains is not None:
-            return tuple(joint.law for _, joint in self.chains.actuated)
-        return tuple(limb.law for limb in self.limbs)
+        return tuple(each.law for each in self.mechanism.stated_drives)
 
     @property
     def driven(self) -> bool:
@@ -248,18 +150,10 @@ class Model:
     @property
     def drives(self) -> tuple[Drive, ...]:
         """The drives as the core takes them."""
-        if self.chains is not None:
-            return tuple(
-                drive(joint.law, a + 1, joint.unit, a, self.geometry, joint.stroke)
-                for a, (_, joint) in enumerate(self.chains.actuated)
-            )
         return tuple(
-            drive(
-                limb.law, i, KINDS[limb.kind].actuator_unit, limb.actuator, self.geometry,
-                limb.stroke,
-            )
-            for i, limb in enumerate(self.limbs, 1)
-        )  # fmt: skip
+            drive(each.law, i, each.unit, each.actuator, self.geometry, each.stroke)
+            for i, each in enumerate(self.mechanism.stated_drives, 1)
+        )
 
     @property
     def own_width(self) -> int:
@@ -288,23 +182,11 @@ class Model:
 
     def limb_of_drive(self, d: int) -> int:
         """The limb, counted from 0, that a drive is in."""
-        return d if self.chains is None else self.chains.actuated[d][0]
+        return self.mechanism.stated_drives[d].limb
 
     def table(self) -> Table:
         """Kind, actuator and joints of each limb; the joints in the frames of base and platform.
 
         Of chains every joint, the machine at home.
         """
-        if self.chains is not None:
-            return self.chains.table()
-        rows = [
-            [
-                *(str(i), limb.kind, f"q{limb.actuator + 1}"),
-                *(fixed(float(place), 3) for place in numbers[:6]),
-            ]
-            for i, (limb, numbers) in enumerate(
-                zip(self.limbs, self.geometry.slots.reshape(len(self.limbs), -1), strict=True), 1
-            )
-        ]
-        heads = [f"{x} [mm]" for x in ("base x", "y", "z", "platform x", "y", "z")]
-        return Table(["limb", "kind", "actuator", *heads], rows, left=3)
+        return self.mechanism.table(self.geometry.slots)

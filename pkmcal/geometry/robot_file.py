@@ -24,8 +24,9 @@ from pkmcal.geometry.box import read_box
 from pkmcal.geometry.controller import read_controller
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.limb_kinds import KINDS
+from pkmcal.geometry.limbs import CHAIN, Limb
 from pkmcal.geometry.load import CableLoad, read_load
-from pkmcal.geometry.model import CHAIN, Limb, Model
+from pkmcal.geometry.model import Model
 from pkmcal.geometry.probe_offset import read_probe
 from pkmcal.geometry.robot_file_chains import chain_limbs, read_chains
 from pkmcal.geometry.robot_file_elastic import TOP as TOP_ELASTIC

@@ -8,7 +8,7 @@ from typing import Any
 from pkmcal.geometry.chain_joints import PARTS, Joint
 from pkmcal.geometry.chains import Chains
 from pkmcal.geometry.geometry import Geometry
-from pkmcal.geometry.model import CHAIN
+from pkmcal.geometry.limbs import CHAIN
 from pkmcal.geometry.robot_file_laws import law_table
 
 

@@ -19,7 +19,7 @@ from pkmcal.files.toml_table import Table, shown
 from pkmcal.geometry.chain_joints import KINDS, Joint, across, error_unit, towards
 from pkmcal.geometry.chains import Chains
 from pkmcal.geometry.laws import gain_unit
-from pkmcal.geometry.model import CHAIN, Limb
+from pkmcal.geometry.limbs import CHAIN, Limb
 from pkmcal.geometry.robot_file_chain_checks import check
 from pkmcal.geometry.robot_file_chain_copies import Listed, copied
 from pkmcal.geometry.robot_file_kind_joints import joints_of_kind
@@ -79,12 +79,9 @@ def read_chains(
 def chain_limbs(chains: Chains) -> tuple[Limb, ...]:
     """The limbs as the model has them: what of a chain is that of any limb."""
     made = []
-    for limb in chains.limbs:
-        own = limb[: len(limb) - chains.tail]
-        driven = [joint for joint in own if joint.actuator is not None]
-        actuator = driven[0].actuator if driven else None
-        stroke = driven[0].stroke if driven else None
-        made.append(Limb(CHAIN, -1 if actuator is None else actuator, 0, {}, stroke=stroke))
+    for limb, actuator in zip(chains.limbs, chains.first_drives, strict=True):
+        stroke = next((joint.stroke for joint in limb if joint.actuator == actuator), None)
+        made.append(Limb(CHAIN, actuator, 0, {}, stroke=stroke))
     return tuple(made)
 
 

@@ -69,5 +69,5 @@ class _Written:
         return self._geometry[name] if tie is None else tie.terms[0].written
 
     def point(self, name: str) -> list[float | str]:
-        """Three numbers."""
+        """The three coordinates of a point, by the names of its numbers."""
         return [self(f"{name}.{axis}") for axis in "xyz"]

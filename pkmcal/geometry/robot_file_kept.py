@@ -21,8 +21,9 @@ from pkmcal.geometry import robot_file
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.laws import LawNumber
 from pkmcal.geometry.limb_kinds import KINDS
+from pkmcal.geometry.limbs import Limb
 from pkmcal.geometry.load import AT, CELL, FORCE, is_of_load
-from pkmcal.geometry.model import Limb, Model
+from pkmcal.geometry.model import Model
 from pkmcal.geometry.ties import LimbNumber
 
 if TYPE_CHECKING:

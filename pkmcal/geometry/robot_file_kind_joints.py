@@ -17,7 +17,7 @@ from pkmcal.core.machine import Machine
 from pkmcal.files.toml_table import Table
 from pkmcal.geometry.chain_joints import Joint, across
 from pkmcal.geometry.limb_kinds import KINDS
-from pkmcal.geometry.model import Cone, Limb
+from pkmcal.geometry.limbs import Cone, Limb
 from pkmcal.geometry.robot_file_limbs import Entry, Parameters, read_limb
 from pkmcal.screw import from_pose
 

@@ -100,5 +100,5 @@ def refuse_turning(model: Model, tables: list[Table]) -> None:
     """Refuse laws whose inverse is not known over the stroke, with the line of their limb."""
     for limb, why in model.doubts():
         tables[min(limb, len(tables) - 1)].fail(
-            "drive" if model.chains is None else "joints", f"limb {limb + 1}: {why}"
+            model.mechanism.key_of_drives, f"limb {limb + 1}: {why}"
         )

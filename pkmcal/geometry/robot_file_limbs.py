@@ -15,7 +15,7 @@ from pkmcal.core.library import AXES, SLOTS
 from pkmcal.files.toml_table import Table, shown, unit_vector
 from pkmcal.geometry.laws import Law, LawNumber, gain_unit
 from pkmcal.geometry.limb_kinds import ALIASES, KINDS, LimbKind
-from pkmcal.geometry.model import Cone, Limb
+from pkmcal.geometry.limbs import Cone, Limb
 from pkmcal.geometry.robot_file_laws import read_law
 from pkmcal.geometry.ties import LimbNumber, Term, Tie
 

@@ -10,8 +10,9 @@ from pkmcal.core.library import AXES, MAPS, POSE
 from pkmcal.geometry.controller import controller_table
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.limb_kinds import KINDS
+from pkmcal.geometry.limbs import Cone, Limb
 from pkmcal.geometry.load import is_of_load, load_table
-from pkmcal.geometry.model import Cone, Limb, Model
+from pkmcal.geometry.model import Model
 from pkmcal.geometry.probe_offset import probe_table
 from pkmcal.geometry.robot_file_chain_writer import chain_tables, tail_tables
 from pkmcal.geometry.robot_file_elastic_writer import elastic_tables, limb_masses

@@ -77,7 +77,7 @@ class Calibration(Stated):
         return super().of_options({**given, "reading": Reading.of_options(given)})
 
     def argv(self) -> list[str]:
-        """The command line that says the same, without what is written."""
+        """Command line of the job, without what is written."""
         words = [*self.reading.options(), *self.options()]
         return command("calibrate", [self.robot, *self.files], words)
 

@@ -33,7 +33,7 @@ class Importing(Stated):
     log: PathText | None = None
 
     def argv(self) -> list[str]:
-        """The command line that says the same."""
+        """Command line of the job."""
         return command("import", [self.file], self.options())
 
     def table(self) -> dict[str, Any]:
@@ -79,5 +79,5 @@ class Exporting(OfMachine):
     project: bool = False
 
     def argv(self) -> list[str]:
-        """The command line that says the same."""
+        """Command line of the job."""
         return command("export", [self.robot], self.options())

@@ -11,7 +11,7 @@ from pkmcal.geometry import robot_file
 from pkmcal.loading import urdf_chain
 
 _TABLES = (".csv", ".tsv", ".txt", ".log", ".xlsx")
-_CONFIGURATIONS = (".cfg", ".g", ".gcode")
+CONFIGURATIONS = (".cfg", ".g", ".gcode")  # endings of a firmware's settings
 
 
 class Inputs:
@@ -22,7 +22,7 @@ class Inputs:
         self._built_in: list[str] = []
 
     def file(self, path: str | Path, called: str | None = None) -> Input:
-        """Take a file; the same for the same name.
+        """Take a file, once for each name.
 
         What is meant may be a part of it, which is then what it is `called`.
         """
@@ -40,7 +40,7 @@ class Inputs:
         suffix = Path(path).suffix.lower()
         if suffix in _TABLES:
             raise FileError(f"{path}: measurements, where a robot is needed: the robot comes first")
-        if suffix in _CONFIGURATIONS:
+        if suffix in CONFIGURATIONS:
             raise FileError(
                 f"{path}: a firmware's configuration, where a robot file is needed: pkmcal import"
                 " makes one of it"
@@ -49,11 +49,11 @@ class Inputs:
 
     @property
     def paths(self) -> list[Path]:
-        """Paths of the files."""
+        """Paths of the files that were taken."""
         return [Path(each) for each in self._files.values()]
 
     def contents(self) -> dict[str, bytes]:
-        """Return the contents by name; of a built-in machine by its own name."""
+        """Return contents of files by their names; a built-in machine has its own name."""
         machines = (robot_file.located(name) for name in self._built_in)
         return {place: content for content, place, _ in machines} | {
             name: each.content(MOST_TABLE) for name, each in self._files.items()

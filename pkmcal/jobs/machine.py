@@ -21,7 +21,7 @@ class OfMachine(Stated):
     robot: str = field(default="", metadata={"argument": True})
 
     def table(self) -> dict[str, Any]:
-        """Tables of a project file: machine, and its own."""
+        """Tables of a project file: the machine's, and that of the job."""
         found = {"machine": machine_table(self.robot), self.TABLE: super().table()}
         return {name: table for name, table in found.items() if table}
 

@@ -56,7 +56,7 @@ class Planning(OfMachine):
     safe_height: float | None = None
 
     def argv(self) -> list[str]:
-        """The command line that says the same, without what is written."""
+        """Command line of the job, without what is written."""
         return command("plan", [self.robot], self.options())
 
     def in_folder(self, folder: str) -> Planning:

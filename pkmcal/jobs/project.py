@@ -79,7 +79,7 @@ class Project:
 
     @classmethod
     def of_table(cls, table: Mapping[str, Any], refuse: Refuse | None = None) -> Project:
-        """Read a table.
+        """Read a project from its tables.
 
         Raises
         ------
@@ -104,7 +104,7 @@ class Project:
         )
 
     def text(self) -> str:
-        """The file."""
+        """Text of the project file."""
         return toml(self.table())
 
     @classmethod

@@ -72,7 +72,7 @@ class Stated:
 
     @classmethod
     def of_table(cls: type[S], table: Mapping[str, Any], refuse: Refuse | None = None) -> S:
-        """Read a table.
+        """Read the options that a table of a project file states.
 
         Parameters
         ----------

@@ -30,7 +30,7 @@ class ArmModel:
     limbs: tuple[()] = ()
     laws: tuple[()] = ()
     driven: Literal[False] = False
-    chains: None = None
+    closed_form: Literal[False] = False
     elastic: None = None
     load: None = None
     balanced_load: None = None

@@ -11,12 +11,11 @@ from pkmcal.arguments import instance
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import BoolArray, FloatArray, Int32Array, Unit
 from pkmcal.geometry.carried import Load
-from pkmcal.geometry.chains import Chains
 from pkmcal.geometry.controller import Controller
 from pkmcal.geometry.elastic import Elastic
 from pkmcal.geometry.laws import Law
+from pkmcal.geometry.limbs import Limb
 from pkmcal.geometry.load import CableLoad
-from pkmcal.geometry.model import Limb
 from pkmcal.geometry.stated_uncertainty import StatedUncertainty
 from pkmcal.kinematics.arm_machine import ArmMachine
 from pkmcal.kinematics.robot import Robot
@@ -91,8 +90,8 @@ class Declarations(Protocol):
         """The limbs."""
 
     @property
-    def chains(self) -> Chains | None:
-        """The joints, where limbs are chains."""
+    def closed_form(self) -> bool:
+        """True if limbs are in closed form, and their numbers are places and lengths."""
 
     @property
     def laws(self) -> tuple[Law | None, ...]:

@@ -10,12 +10,10 @@ from numpy.typing import ArrayLike
 
 from pkmcal.arrays import FloatArray, as_rows
 from pkmcal.display import Table
-from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.kinematics.robot import Robot, require_parallel
 from pkmcal.result import Result
 
 BLOCK = 20_000  # poses at a time
-_NONE = 1e-9  # of the largest: a singular value that is none
 _SUMMARY = (np.min, np.median, np.max)
 
 
@@ -118,59 +116,5 @@ def _measures(robot: Robot, poses: FloatArray) -> FloatArray:
     out[2, good] = sigma.prod(axis=1)
     if steps.shape[1] == steps.shape[2]:
         out[3, good] = np.linalg.det(steps)
-    slopes = np.abs(robot.machine.slopes(slots, q[good]))
-    if robot.model.chains is None:
-        out[4, good] = _transmission(robot, closure.by_q[good], slopes)
-    else:
-        out[4, good] = _chain_transmission(robot, closure.by_q[good], slopes)
-        if robot.model.chains.tail:
-            out[4, good] = np.fmin(
-                out[4, good], _tail_transmission(robot, own[good], q[good], slopes)
-            )
+    out[4, good] = robot.limb_kinematics.transmission(robot, own[good], q[good], closure.by_q[good])
     return out
-
-
-def _tail_transmission(
-    robot: Robot, own: FloatArray, q: FloatArray, slopes: FloatArray
-) -> FloatArray:
-    """Return the least share of a tail joint's motion that no other actuator makes, (N,).
-
-    With more than six actuators others can always do it, and this says nothing: infinite.
-    """
-    chains, machine = robot.model.chains, robot.machine
-    assert chains is not None
-    least = np.full(len(own), np.inf)
-    if robot.n_actuators > own.shape[1]:
-        return least
-    arms = slopes * [1.0 if joint.unit == "mm" else robot.length for joint, _ in chains.arms]
-    twists = machine.forward_jacobian(robot.slots, own, q, twists=True) / arms[:, None]
-    twists[:, :3] *= robot.length
-    for a in range(robot.n_actuators - chains.tail, robot.n_actuators):
-        mine, others = twists[:, :, a], np.delete(twists, a, axis=2)
-        axes, sigma, _ = np.linalg.svd(others, full_matrices=False)
-        axes *= (sigma > _NONE * sigma[:, :1])[:, None]
-        rest = mine - (axes @ (axes.swapaxes(1, 2) @ mine[..., None]))[..., 0]
-        least = np.fmin(least, np.linalg.norm(rest, axis=1) / np.linalg.norm(mine, axis=1))
-    return least
-
-
-def _chain_transmission(robot: Robot, by_q: FloatArray, slopes: FloatArray) -> FloatArray:
-    """Return the share of an actuator's motion, at its arm, that reaches its closures."""
-    chains = robot.model.chains
-    assert chains is not None
-    arms = slopes * [1.0 if joint.unit == "mm" else arm for joint, arm in chains.arms]
-    found: FloatArray = np.linalg.norm(by_q, axis=1) / arms
-    return np.asarray(found.min(axis=1))
-
-
-def _transmission(robot: Robot, by_q: FloatArray, slopes: FloatArray) -> FloatArray:
-    least = np.full(len(by_q), np.inf)
-    row = 0
-    for i, limb in enumerate(robot.model.limbs):
-        kind = KINDS[limb.kind]
-        arm = slopes[:, i]
-        if kind.driver.arm and kind.actuator_unit == "rad":
-            arm = arm * abs(float(robot.geometry[f"{kind.driver.arm}{i + 1}"]))
-        least = np.minimum(least, np.abs(by_q[:, row, limb.actuator]) / arm)
-        row += 1 + len(kind.all_rows(limb.couple > 0))
-    return least

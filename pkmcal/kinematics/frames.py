@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pkmcal.arrays import FloatArray
-from pkmcal.core.poses import compose, compose_rates, compose_twists, invert
-
-NOWHERE = np.zeros(6)
+from pkmcal.core.poses import NOWHERE, compose, compose_rates, compose_twists, invert
 
 
 class Frames:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal.arguments import instance
-from pkmcal.arrays import BoolArray, FloatArray, Unit, as_numbers, as_rows, mm_per_unit
+from pkmcal.arrays import BoolArray, FloatArray, as_numbers, as_rows, mm_per_unit
 from pkmcal.core.chains import AnyMachine, ChainMachine
 from pkmcal.core.core_machine import written
 from pkmcal.core.driven import DrivenMachine
@@ -21,7 +21,8 @@ from pkmcal.core.pulleys import PulleyMachine
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.carried import Load
 from pkmcal.geometry.limb_kinds import KINDS
-from pkmcal.geometry.model import CHAIN, Model
+from pkmcal.geometry.limbs import CHAIN
+from pkmcal.geometry.model import Model
 from pkmcal.kinematics.complete import (
     Completed,
     complete,
@@ -84,7 +85,7 @@ class Kinematics:
         ValueError
             The limbs are chains of joints.
         """
-        if self.model.chains is not None or isinstance(self.machine, ChainMachine):
+        if isinstance(self.machine, ChainMachine) or not self.model.closed_form:
             raise ArgumentError(f"robot: {self.model.name} has limbs that are chains of joints")
         return self.machine
 
@@ -109,8 +110,9 @@ class Kinematics:
         says that the actuators read.
         """
         q = self.machine.inverse(self.slots, self.own_home[None])
-        if self.model.chains is not None and not np.isfinite(q).all():
-            q = self.machine.at_drives(self.slots, self.model.chains.layout.zero[None])
+        stated = self.model.mechanism.read_at_home
+        if stated is not None and not np.isfinite(q).all():
+            q = self.machine.at_drives(self.slots, stated[None])
         return np.asarray(q[0])
 
     @property
@@ -168,14 +170,7 @@ class Kinematics:
         The root mean square distance of the platform joints from their centre, or of the base
         points where the platform joints coincide.
         """
-        if self.model.chains is not None:
-            return self.model.chains.length
-        for joints in (self.slots[:, 3:6], self.slots[:, 0:3]):
-            spread = joints - joints.mean(axis=0)
-            radius = float(np.sqrt((spread**2).sum(axis=1).mean()))
-            if radius > 1e-9 * (1.0 + float(np.abs(self.slots[:, :6]).max())):
-                return radius
-        return 1.0
+        return self.model.mechanism.characteristic_length(self.slots)
 
     def inverse(
         self,
@@ -528,12 +523,7 @@ class Kinematics:
     @property
     def passive_names(self) -> tuple[str, ...]:
         """Passive joints, in the order of `Forward.passive`: of chains, and swivels of pulleys."""
-        if self.model.chains is None:
-            return tuple(f"swivel{i + 1}" for i in self.model.pulleys)
-        names = list(self.model.chains.parts)
-        coordinate = self.model.chains.layout.coordinate
-        order = sorted(range(len(names)), key=lambda k: int(coordinate[k]))
-        return tuple(names[k] for k in order if coordinate[k] >= 0)
+        return self.model.mechanism.passive_names
 
     def passive_joints(self, own: FloatArray, q: FloatArray) -> FloatArray:
         """Return passive joints' ways from home at own poses (N, 6), (N, passive).
@@ -555,18 +545,6 @@ class Kinematics:
             slots, machine = machine.under_load(slots, np.ascontiguousarray(own), q), machine.inner
         return machine.bare(slots, q)
 
-    def chain_points(self, own: FloatArray, q: FloatArray) -> list[FloatArray]:
-        """Return the joints of each chain at own poses (N, 6), in own axes: (N, joints, 3)."""
-        machine, slots, at = self.bare_at(own, q)
-        assert isinstance(machine, ChainMachine) and self.model.chains is not None
-        frames = machine.frames(slots, np.ascontiguousarray(own), at)[1]
-        found, start = [], 0
-        for limb, parts in zip(self.model.chains.limbs, self.model.chains.members, strict=True):
-            first = np.cumsum([0, *(joint.parts for joint in limb[:-1])])
-            found.append(frames[:, start + first, 9:])
-            start += len(parts) + 1
-        return found
-
     def closure_by_twist(self, own: FloatArray, q: FloatArray | None = None) -> FloatArray:
         """Closure rows by a scaled twist, (N, rows, m), at own poses (N, 6) and q (N, n).
 
@@ -581,7 +559,7 @@ class Kinematics:
 
         Chains, which the inverse has in the posture that is reached from home, count as such.
         """
-        if self.model.chains is not None:
+        if not self.model.closed_form:
             return np.ones(len(q), dtype=bool)
         return in_working_mode(self.machine, self.slots, own, q)
 
@@ -600,10 +578,8 @@ class Kinematics:
         Of a chain that of its first actuator, 0 where it has none.
         """
         found = self.machine.drives(self.slots, q)
-        if self.model.chains is None:
-            return found
         each = np.hstack([found, np.zeros((len(q), 1))])
-        return np.asarray(each[:, [limb.actuator for limb in self.model.limbs]])
+        return np.asarray(each[:, list(self.model.mechanism.first_drives)])
 
     def short_way(self, start: FloatArray, end: FloatArray) -> FloatArray:
         """Coordinates (n,) of `end` at the turn nearest to `start`, unless a stroke forbids it."""
@@ -615,17 +591,10 @@ class Kinematics:
         """Mark actuators (n,) that keep the strokes of all their limbs at coordinates (n,)."""
         inside = np.ones(self.n_actuators, dtype=bool)
         drives = self.machine.drives(self.slots, q[None])[0]
-        for (actuator, stroke, unit), drive in zip(self._strokes(), drives, strict=True):
-            margin = margin_of(stroke, drive)
-            inside[actuator] &= bool(kept(margin, unit, self.machine.struct.size))
+        for each, drive in zip(self.model.mechanism.stated_drives, drives, strict=True):
+            margin = margin_of(each.stroke, drive)
+            inside[each.actuator] &= bool(kept(margin, each.unit, self.machine.struct.size))
         return inside
-
-    def _strokes(self) -> list[tuple[int, tuple[float, float] | None, Unit]]:
-        """Actuator, stroke and unit of each drive: of limbs, of chains those of the actuators."""
-        if self.model.chains is not None:
-            return [(a, j.stroke, j.unit) for a, (_, j) in enumerate(self.model.chains.actuated)]
-        limbs = self.model.limbs
-        return [(limb.actuator, limb.stroke, KINDS[limb.kind].actuator_unit) for limb in limbs]
 
 
 def _for_each(

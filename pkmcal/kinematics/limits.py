@@ -10,7 +10,7 @@ import numpy as np
 from pkmcal.arrays import BoolArray, FloatArray, Unit
 from pkmcal.display import Table, first_rows
 from pkmcal.geometry.limb_kinds import KINDS
-from pkmcal.geometry.model import Cone, Limb
+from pkmcal.geometry.limbs import Cone, Limb
 from pkmcal.result import Result
 
 AT_LIMIT = 1e-10  # of the machine's size, or rad: so near a limit it is kept

@@ -1,7 +1,7 @@
-"""A machine that yields, with the calls of a rigid one: that with the numbers that gave.
+"""A machine that yields, with the calls of a rigid machine.
 
-At a pose these follow at once (`resting`), so that the inverse needs no search; forward kinematics
-goes through them until they stay.
+At a pose the numbers that gave way follow at once (`resting`), so that the inverse needs no search;
+forward kinematics goes through them until they stay.
 """
 
 from __future__ import annotations
@@ -19,7 +19,11 @@ from pkmcal.core.machine import Closure, Machine, Yielding
 from pkmcal.core.path_differences import actuator_rates, platform_motion
 from pkmcal.core.poses import rates_of_twists
 from pkmcal.exceptions import ArgumentError
+from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.kinematics.resting import MOST_STEPS, SETTLED, RestingMachine
+
+# Drivers of the core by which no anchor moves.
+_UNMOVED = {kind.driver.core for kind in KINDS.values() if not kind.driver.carries}
 
 
 class LoadedMachine(RestingMachine):
@@ -41,7 +45,7 @@ class LoadedMachine(RestingMachine):
         angles = any(spring.unit == "rad" for spring in elastic.springs)
         drivers = [DRIVERS[driver] for driver in self.struct.driver[0 : self.struct.limbs]]
         offsets = all(spring.of_drive for spring in elastic.springs)
-        legs = offsets and not angles and set(drivers) == {"length"}
+        legs = offsets and not angles and _UNMOVED.issuperset(drivers)
         return legs or not elastic.rods  # halves of legs at base points do not move with offsets
 
     # kinematics: as `pkmcal.core.machine.Machine` -------------------------------------------------

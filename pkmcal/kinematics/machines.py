@@ -70,8 +70,7 @@ def _loaded(model: Model, inner: CompiledMachine, slots: FloatArray) -> LoadedMa
             f"{lead}, and {inner.rows} closures for {inner.m} coordinates: how forces are shared"
             " then depends on how it was put together"
         )
-    chains = model.chains
-    if chains is not None and (chains.layout.shared or chains.layout.loose or chains.tail):
+    if not model.mechanism.apart or model.mechanism.loose:
         raise ArgumentError(f"{lead}, which chains that share joints or carry a tail cannot have")
     pulls = Pulls(model.elastic, model.base_frame, model.tool_frame)
     place = dict(zip(model.geometry.names, model.geometry.slot_index.tolist(), strict=False))

@@ -14,7 +14,6 @@ import numpy as np
 from pkmcal.arrays import FloatArray, IntArray, Unit, mm_per_unit
 from pkmcal.core.driven import DrivenMachine
 from pkmcal.core.library import COORDINATE_UNITS
-from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.kinematics.calibratable import Calibratable, as_parallel
 from pkmcal.kinematics.robot import Robot
 
@@ -55,9 +54,7 @@ def surplus(machine: Calibratable) -> int:
     robot = as_parallel(machine)
     if robot is None or robot.machine.rows <= robot.machine.m:
         return 0
-    chains = robot.model.chains
-    apart = chains is None or not (chains.layout.shared or chains.tail)
-    return row_roles(robot).surplus if apart else 0
+    return row_roles(robot).surplus if robot.model.mechanism.apart else 0
 
 
 def row_roles(robot: Robot) -> RowRoles:
@@ -76,7 +73,7 @@ def row_roles(robot: Robot) -> RowRoles:
     slopes = readings(robot, home, robot.inverse(home))[1][0]
     along = passive @ slopes / mm_per_unit(step_units(robot), robot.length)
     weighted = [weight != 1.0 for limb in robot.model.limbs for weight in limb.weights]
-    if robot.model.chains is None:
+    if robot.model.closed_form:
         along /= np.linalg.norm(along, axis=1, keepdims=True)
     else:  # rows of chains are combinations of unit wrenches, and may be of none
         weighted = [False] * len(beside)
@@ -147,10 +144,4 @@ def readings_by_tension(robot: Robot, pose: FloatArray) -> FloatArray:
 
 def sphere_actuators(robot: Robot) -> list[int]:
     """Return the actuator of each row of `readings`; -1 for rows beside a limb's own."""
-    if robot.model.chains is not None:
-        return [*range(robot.n_actuators), *[-1] * (robot.machine.rows - robot.n_actuators)]
-    of_rows: list[int] = []
-    for limb in robot.model.limbs:
-        beside = KINDS[limb.kind].all_rows(limb.couple > 0)
-        of_rows += [limb.actuator] + [-1] * len(beside)
-    return of_rows
+    return robot.model.mechanism.row_actuators(robot.machine.rows)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray
-from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.load import CableLoad
 from pkmcal.kinematics.robot import Robot
 from pkmcal.kinematics.tensions import can_pull
@@ -16,8 +15,7 @@ _SOME = 1e-3  # N: with a force of 1 N
 
 def on_cables(robot: Robot) -> bool:
     """Return whether every limb is a cable."""
-    limbs = robot.model.limbs
-    return robot.model.chains is None and all(KINDS[limb.kind].cable for limb in limbs)
+    return all(limb.cable for limb in robot.model.limbs)
 
 
 def load_of(robot: Robot) -> CableLoad | None:

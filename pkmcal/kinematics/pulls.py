@@ -10,12 +10,12 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray, furthest_axis
 from pkmcal.core.library import SLOTS
+from pkmcal.core.poses import NOWHERE
 from pkmcal.geometry.carried import CARRIED
 from pkmcal.geometry.elastic import Elastic
 from pkmcal.screw import from_pose
 
 _BASE, _PLATFORM = SLOTS.index("base.x"), SLOTS.index("platform.x")
-_NOWHERE = np.zeros(6)
 
 
 class Pulls:
@@ -32,8 +32,8 @@ class Pulls:
     def __init__(self, elastic: Elastic, base: FloatArray | None, tool: FloatArray | None) -> None:
         self.elastic = elastic
         self._index = {name: i for i, name in enumerate(elastic.units)}
-        self._inward = from_pose(_NOWHERE if base is None else base)[:3, :3].T
-        self._tool = from_pose(_NOWHERE if tool is None else tool)
+        self._inward = from_pose(NOWHERE if base is None else base)[:3, :3].T
+        self._tool = from_pose(NOWHERE if tool is None else tool)
         gravity = np.array(elastic.gravity)
         self._strength = float(np.linalg.norm(gravity))
         self._down = _frame(gravity / self._strength) if self._strength else np.eye(3)

@@ -22,7 +22,7 @@ class Actuated(Protocol):
 
 def gain_of(robot: Actuated, actuator: int) -> tuple[float | None, bool]:
     """The gain of the first limb of an actuator, and whether it turns a spool; None: no limb."""
-    if not isinstance(robot, Robot) or robot.model.chains is not None:
+    if not isinstance(robot, Robot) or not robot.model.closed_form:
         return None, False
     limbs = robot.model.limbs
     limb = next((k for k, limb in enumerate(limbs) if limb.actuator == actuator), None)

@@ -159,7 +159,7 @@ class RestingMachine(CoreMachine):
         return slots[..., 0, self._width :]
 
     def _within(self, places: IntArray | Int32Array) -> Int32Array:
-        """Places of numbers of the machine within in its own geometry."""
+        """Return places of numbers in the geometry of the rigid machine."""
         if isinstance(self.inner, DrivenMachine):
             return np.asarray(places, dtype=np.int32)
         row, column = np.divmod(places, self._shape[1])

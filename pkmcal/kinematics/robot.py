@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike
 from pkmcal import arguments
 from pkmcal.arguments import instance, whole
 from pkmcal.arrays import FloatArray, Unit, as_rows, wrapped
-from pkmcal.core.chains import ChainMachine
 from pkmcal.core.library import COORDINATE_UNITS, POSE
 from pkmcal.core.poses import rates_of_twists
 from pkmcal.display import Table
@@ -28,10 +27,12 @@ from pkmcal.geometry.carried import Load
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.model import Model
 from pkmcal.geometry.yielding import carrying, yielding
-from pkmcal.kinematics import chain_limits
+from pkmcal.kinematics.closed_form import ClosedForm
 from pkmcal.kinematics.complete import completed
+from pkmcal.kinematics.joint_chains import JointChains
 from pkmcal.kinematics.kinematics import Kinematics, Match
-from pkmcal.kinematics.limits import Feasibility, feasibility
+from pkmcal.kinematics.limb_kinematics import LimbKinematics
+from pkmcal.kinematics.limits import Feasibility
 from pkmcal.kinematics.loaded import AnyCompiled
 from pkmcal.modes.assemblies import Assemblies
 from pkmcal.modes.find import assemblies, continue_path, find_modes, nearest_first, pose_distance
@@ -175,29 +176,15 @@ class Robot(Kinematics, Result):
         given, shape = as_rows("pose", pose, 6)
         own = self.frames.inward(given)
         q = None if actuators is None else self._batch(actuators, shape)
-        limits = (
-            self._limb_limits(own, q) if self.model.chains is None else self._chain_limits(own, q)
-        )
+        limits = self.limb_kinematics.limits(self, own, q)
         found = replace(limits, workspace=box.in_box(self.model.workspace, given))
         arrays = {f.name: getattr(found, f.name) for f in fields(Feasibility) if f.name != "tail"}
         return replace(found, **{k: a.reshape((*shape, *a.shape[1:])) for k, a in arrays.items()})
 
-    def _limb_limits(self, own: FloatArray, q: FloatArray | None) -> Feasibility:
-        """Limits of limbs in closed form at own poses (N, 6), by actuators (N, n) or without."""
-        drive, on_base, on_platform = self.limb_machine.limbs(self.slots, own)
-        reach = np.isfinite(drive)
-        if q is not None:
-            drive = self.drives(q)
-        size = self.machine.struct.size
-        return feasibility(self.model.limbs, reach, drive, on_base, on_platform, size)
-
-    def _chain_limits(self, own: FloatArray, q: FloatArray | None) -> Feasibility:
-        """Limits of chains at own poses (N, 6) with coordinates (N, n), by default the inverse."""
-        if q is None:
-            q = self.machine.inverse(self.slots, own)
-        machine, slots, at = self.bare_at(own, q)
-        assert isinstance(machine, ChainMachine) and self.model.chains is not None
-        return chain_limits.feasibility(self.model.chains, machine, slots, own, at)
+    @cached_property
+    def limb_kinematics(self) -> LimbKinematics:
+        """The kinematics of its limbs, as their kind answers for them."""
+        return ClosedForm() if self.model.chains is None else JointChains(self.model.chains)
 
     def within(self, ends: box.Box) -> Robot:
         """The robot with a smaller workspace: coordinates with their ends, mm and rad.
@@ -702,7 +689,7 @@ class Robot(Kinematics, Result):
         """
         for limb, why in self.model.doubts():
             raise ArgumentError(f"robot: limb {limb + 1} of {self.name}: its drive law: {why}")
-        if like is None or self.model.chains is not None or self.model.elastic is not None:
+        if like is None or not self.model.closed_form or self.model.elastic is not None:
             robot_file.write(self.model, path, comment)
             return
         from pkmcal.geometry.robot_file_kept import text_like

@@ -114,9 +114,7 @@ def tensions(
     array([5., 5., 5., 5.])
     """
     require_parallel(robot)
-    if robot.model.chains is not None:
-        raise ArgumentError(f"robot: {robot.name} has chains of joints, no cables")
-    cables = np.array([KINDS[limb.kind].cable for limb in robot.model.limbs])
+    cables = np.array([limb.cable for limb in robot.model.limbs])
     if not cables.any():
         raise ArgumentError(f"robot: {robot.name} has no cables")
     rows, shape = as_rows("poses", poses, 6)

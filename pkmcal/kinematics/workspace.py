@@ -233,11 +233,7 @@ def reach(robot: Robot) -> dict[str, tuple[float, float]]:
         if not broken and not pulled(robot, robot.home[None])[0]:
             why = "at home some cable would have to push, under the load of the file"
         raise ArgumentError(f"{robot.name}: {why.replace(' in rows 0', '')}")
-    if robot.model.chains is not None:
-        size = robot.model.chains.size
-    else:
-        joints = np.abs(robot.geometry.slots[:, :6]).sum(axis=1)
-        size = float(joints.max() + np.abs(robot.home[:3]).sum())
+    size = robot.model.mechanism.extent(robot.geometry.slots, robot.home)
     found = {}
     for name in robot.moved:
         stated = robot.model.workspace.get(name, (-np.inf, np.inf))

@@ -16,6 +16,8 @@ from pkmcal.kinematics.robot import Robot
 
 FARTHEST = 1e5  # mm, rad; a reading beyond it is a mistake of who sent or typed it
 
+RESTS = 20  # looks at rest after which a move that has not arrived has ended elsewhere
+
 
 class DeviceError(Error):
     """A machine or an instrument does not answer, or refuses; says which and why."""
@@ -95,7 +97,7 @@ class Instrument(Protocol):
         """One reading (k,), mm and rad; NaN: nothing was seen. `wanted` says where and what."""
 
     def close(self) -> None:
-        """Free what was opened."""
+        """Close connections and files of the device."""
 
 
 def require_translations(robot: Robot, what: str) -> None:

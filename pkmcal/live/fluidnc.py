@@ -80,7 +80,7 @@ class FluidNC:
             sleep(_PAUSE)
 
     def where(self) -> Where:
-        """Its machine coordinates; it says nothing of its drives."""
+        """Return the machine's coordinates; FluidNC says nothing of its drives."""
         _, place = self._status()
         if place is None:
             return Where()

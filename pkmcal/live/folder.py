@@ -65,7 +65,7 @@ class WatchedFolder:
         raise DeviceError(f"folder: nothing was added in {self._folder} for {_WAIT:g} s")
 
     def close(self) -> None:
-        """Nothing is open."""
+        """Do nothing: no connection is held."""
 
     def _paths(self) -> list[Path]:
         try:

@@ -13,12 +13,11 @@ from pkmcal.arrays import FloatArray
 from pkmcal.core.library import POSE
 from pkmcal.kinematics.robot import Robot
 from pkmcal.live.address import host_and_port
-from pkmcal.live.device import DeviceError, Where, understood
+from pkmcal.live.device import RESTS, DeviceError, Where, understood
 from pkmcal.live.lines import Lines
 
 _PORT = 5007
 _MOVE, _PAUSE = 600.0, 0.05  # s that a move may take, and between questions
-_RESTS = 20  # looks at rest after which a move that has not arrived has ended elsewhere
 _THERE = 1e-3  # mm, deg that a place may differ from the command by
 _PASSWORDS = ("EMC", "EMCTOO")  # of the program where none are stated
 
@@ -65,7 +64,7 @@ class LinuxCNC:
             idle = idle + 1 if self._get("program_status") == "IDLE" else 0
             if idle and off < _THERE:
                 return
-            if idle > _RESTS:
+            if idle > RESTS:
                 raise DeviceError(
                     f"LinuxCNC stopped {off:.3f} from the pose; it says: {self._get('error')}"
                 )
@@ -74,7 +73,7 @@ class LinuxCNC:
             sleep(_PAUSE)
 
     def where(self) -> Where:
-        """Its coordinates, and its joints as they are."""
+        """Return the machine's coordinates and the positions of its joints."""
         place = self._numbers("abs_act_pos", max(self._axes) + 1)
         pose = np.full(6, np.nan)
         pose[self._axes] = place[self._axes]

@@ -115,7 +115,7 @@ class Moonraker:
         self._server.ask("/printer/emergency_stop", "POST", wait=3.0)
 
     def close(self) -> None:
-        """Nothing is open."""
+        """Do nothing: no connection is held."""
 
     def _run(self, script: str) -> None:
         self._server.ask("/printer/gcode/script", "POST", wait=_MOVE, script=script)

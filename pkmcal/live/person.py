@@ -49,7 +49,7 @@ class PersonDrives:
         """A person stops by hand."""
 
     def close(self) -> None:
-        """Nothing is open."""
+        """Do nothing: no connection is held."""
 
 
 class PersonReads:
@@ -78,7 +78,7 @@ class PersonReads:
             wanted = f"expected {one}, such as 0.12, or - where nothing is seen; again"
 
     def close(self) -> None:
-        """Nothing is open."""
+        """Do nothing: no connection is held."""
 
 
 def _answer(ask: Ask, question: str) -> str:

@@ -13,11 +13,10 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray
 from pkmcal.kinematics.robot import Robot
-from pkmcal.live.device import DeviceError, Where, require_translations, understood
+from pkmcal.live.device import RESTS, DeviceError, Where, require_translations, understood
 from pkmcal.live.http import RefusedError, Server
 
 _MOVE, _PAUSE = 600.0, 0.1  # s that a move may take, and between questions
-_RESTS = 20  # looks at rest after which a move that has not arrived has ended elsewhere
 _THERE = 0.01  # mm that a place may differ from the command by
 _PASSWORD = "reprap"  # that of the firmware where none is set; no other is asked for or kept
 
@@ -67,7 +66,7 @@ class RepRap:
             idle = idle + 1 if status == "idle" else 0
             if idle and (off := np.abs(self._place() - pose[:3]).max()) < _THERE:
                 return
-            if idle > _RESTS:
+            if idle > RESTS:
                 said = " ".join(self._server.text("/rr_reply").split())
                 raise DeviceError(
                     f"the machine is at rest {off:.3f} mm from where it was to go; it says:"

@@ -14,6 +14,7 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray
 from pkmcal.exceptions import ArgumentError
+from pkmcal.files.units import INCH
 from pkmcal.live.device import DeviceError
 
 _BAUD = 9600
@@ -23,7 +24,6 @@ _READING = re.compile(
     rb"(?:\d{2}[A-Z](?=[+-])|[A-Za-z]?[=: ]{0,3})"
     rb"(?P<number>[+-]? ?\d{1,6}(?P<point>[.,]\d{1,6})?) ?(?P<unit>mm|in|\")?"
 )
-_INCH = 25.4
 
 
 class SerialGauge:
@@ -84,7 +84,7 @@ def _number(line: bytes, name: str) -> float:
     if found is None or not (found["point"] or found["unit"]):  # as in "ERR 2", "911"
         raise DeviceError(f"the gauge at {name} sends {line[:60]!r}, which is no single number")
     number = float(found["number"].replace(b",", b".").replace(b" ", b""))
-    return number * (_INCH if found["unit"] in (b"in", b'"') else 1.0)
+    return number * (INCH if found["unit"] in (b"in", b'"') else 1.0)
 
 
 def _opened(port: str, baud: int) -> Any:

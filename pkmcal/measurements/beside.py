@@ -59,6 +59,6 @@ class Beside(Field):
                 yield WrittenColumn(f"{self.name}.{name}", "", given[name])
 
     def said(self, m: Any) -> str:
-        """Say the names."""
+        """Name the functions and their numbers in one line."""
         given = self.of(m)
         return "" if given is None else f"beside them {', '.join(given.dtype.names)}"

@@ -49,7 +49,7 @@ class CarriedLoad(Field):
         return set(_COLUMNS)
 
     def read(self, table: Table, instrument: Reading, units: Sequence[str]) -> FloatArray | None:
-        """In kg, mm, N and N mm; 0 of what has no column."""
+        """Read loads in kg, mm, N and N mm; 0 of what has no column."""
         given = [name for name in _COLUMNS if name in table.columns]
         if not given:
             return None

@@ -18,7 +18,7 @@ from pkmcal.exceptions import ArgumentError
 from pkmcal.result import Result
 
 REPEATS = 30  # what the standard asks for at each pose
-_SIGMAS = 3.0  # of the spread, which the standard adds to the mean
+SIGMAS = 3.0  # of the spread, which the standard adds to the mean
 _PAIRED = 300  # poses between which distances are taken, at most
 
 
@@ -125,7 +125,7 @@ def performance(measured: ArrayLike, commanded: ArrayLike, pose: ArrayLike) -> P
     return Performance(
         repeats=repeats,
         accuracy=np.linalg.norm(centre - sent, axis=1),
-        repeatability=mean(away) + _SIGMAS * spread,
+        repeatability=mean(away) + SIGMAS * spread,
         distance_accuracy=_paired_distances(points, group, some) - pdist(sent[some]),
     )
 

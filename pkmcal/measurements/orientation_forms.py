@@ -139,7 +139,7 @@ def _chosen(table: Table, said: str, forms: dict[str, Rotation], rotation: str |
 
 
 def _inverted(chosen: str, turns: Rotation) -> dict[str, Rotation]:
-    """Other readings of what the headings say."""
+    """Other meanings that headings of orientations may have."""
     other = {f"{chosen} of the base in the platform's frame (--invert-poses)": turns.inv()}
     if chosen == "wxyz":
         other["xyzw"] = Rotation.from_quat(turns.as_quat()[:, [3, 0, 1, 2]])

@@ -1,4 +1,4 @@
-"""Repeated rows."""
+"""Rows that repeat a measurement: those of one target, at one pose."""
 
 from __future__ import annotations
 

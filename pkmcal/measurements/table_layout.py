@@ -15,13 +15,12 @@ from pkmcal.arguments import words as as_words
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files import units
 from pkmcal.files.column_names import BESIDE, canonical
-from pkmcal.files.csv_table import Table
+from pkmcal.files.csv_table import SHOWN, Table
 from pkmcal.files.header import parted
 from pkmcal.measurements.actuator_columns import actuators_in
 from pkmcal.readings.rows import is_name
 
 _SLIP = 0.8  # how like a known name a mistyped one is, as difflib counts
-_SHOWN = 8  # names of columns in a message
 _LAST_NUMBER = re.compile(r"([0-9]{1,9})\D*$")
 _OF_NUMBERS = re.compile(r"[+-]?[0-9.,]+")
 _PARTING = r"[\s_\-.:/]+"
@@ -264,9 +263,9 @@ def leave_out_unknown(table: Table, known: Collection[str], also: Collection[str
             )
     if unknown:
         named = [repr(table.columns[name].name) for name in unknown]
-        more = f" and {len(named) - _SHOWN} more" if len(named) > _SHOWN else ""
+        more = f" and {len(named) - SHOWN} more" if len(named) > SHOWN else ""
         many = "s" if len(named) > 1 else ""
-        table.notes.append(f"unknown column{many} left out: {', '.join(named[:_SHOWN])}{more}")
+        table.notes.append(f"unknown column{many} left out: {', '.join(named[:SHOWN])}{more}")
         table.left_out = {table.columns[name].name: table.columns[name].unit for name in unknown}
         table.leave_out(unknown)
 

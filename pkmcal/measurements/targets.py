@@ -59,7 +59,7 @@ class TargetIndex(Field):
         return self.framed(m)
 
     def said(self, m: Any) -> str:
-        """The names, or where the one target is."""
+        """Say the names of the targets, or the place of the only one."""
         if m.target_names is not None:
             known = "" if m.target is not None else " (places not known)"
             return f"targets {' '.join(m.target_names)}{known}"
@@ -69,7 +69,7 @@ class TargetIndex(Field):
 
 
 def checked_target(target: FloatArray | None, m: Any) -> FloatArray | None:
-    """One target, one per row, or several that an index chooses from; None where none is given."""
+    """Return one target, one a row, or several that an index chooses from; None without any."""
     index, rows = m.target_index, len(m)
     if target is None:
         if m.instrument.point == "base":

@@ -46,7 +46,7 @@ class Temperature(Field):
         return {self.name, *(f"{self.name}.{part}" for part in ("base", "platform", *actuators))}
 
     def read(self, table: Table, instrument: Reading, units: Sequence[str]) -> FloatArray | None:
-        """In °C; NaN where none was read, or of a part without a column."""
+        """Read temperatures in °C; NaN where none was read, or of a part without a column."""
         given = [name for name in table.columns if name.partition(".")[0] == self.name]
         if not given:
             return None

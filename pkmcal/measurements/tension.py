@@ -32,7 +32,7 @@ class Tension(Field):
         return {self.name, *(f"{self.name}.{q}" for q in actuators)}
 
     def read(self, table: Table, instrument: Reading, units: Sequence[str]) -> FloatArray | None:
-        """In N."""
+        """Read tensions in N."""
         return read_of_actuators(
             table,
             self.name,

@@ -10,12 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pkmcal.arguments import whole
-from pkmcal.arrays import BoolArray, FloatArray, Int32Array, as_rows, first_largest
+from pkmcal.arrays import TIED_CLOSELY, BoolArray, FloatArray, Int32Array, as_rows, first_largest
 from pkmcal.display import POSE_HEADER, Table, pose_cells
 from pkmcal.exceptions import ArgumentError
 from pkmcal.result import Result
-
-_ALIKE = 1e-9  # of the largest distance: modes that differ by less are equally far
 
 Signs = NDArray[np.int8]
 
@@ -88,7 +86,7 @@ class Assemblies(Result):
         if not len(self):
             raise ArgumentError("there are no modes to choose from")
         apart = self._distance(rows)
-        return first_largest(-apart, _ALIKE * float(apart.max()))
+        return first_largest(-apart, TIED_CLOSELY * float(apart.max()))
 
     def reached_from(
         self, pose: ArrayLike, actuators: ArrayLike | None = None, steps: int = 200
@@ -121,7 +119,7 @@ class Assemblies(Result):
         if not np.isfinite(end).all() or not len(self):
             return None
         apart = self._distance(end[None])
-        best = first_largest(-apart, _ALIKE * float(apart.max()))
+        best = first_largest(-apart, TIED_CLOSELY * float(apart.max()))
         return best if apart[best] <= 1e-6 + 10.0 * np.nan_to_num(self.error[best]) else None
 
     def _parts(self) -> Iterator[str | Table]:

@@ -12,10 +12,10 @@ from pkmcal.arrays import FloatArray
 from pkmcal.kinematics.dexterity import dexterity
 from pkmcal.kinematics.limits import Feasibility
 from pkmcal.kinematics.robot import Robot
+from pkmcal.moves.jumps import HALVINGS
 from pkmcal.result import Result
 
 _STEPS = 2000  # along a move
-_HALVINGS = 50  # of a step, to the time a limit is met
 _THIRDS = 40  # taken off two steps, to where a margin is least
 _NEAR = 4.0  # times what a margin falls by in a step: no dip between steps goes deeper
 _STILL = 1e-9  # mm, rad or share: what a margin at rest changes by
@@ -113,8 +113,7 @@ def events(move: Sampled) -> list[Event]:
 
 
 def _names(move: Sampled) -> list[tuple[str, int | None]]:
-    chains = move.robot.model.chains
-    tail = chains is not None and chains.tail > 0
+    tail = move.robot.model.mechanism.tail > 0
     limbs = range(1, len(move.robot.model.limbs) + tail + 1)
     names: list[tuple[str, int | None]] = [
         (what, limb) for what in Feasibility.LIMITS for limb in limbs
@@ -161,7 +160,7 @@ def _dips(move: Sampled, times: FloatArray) -> FloatArray:
 
 def _turn(move: Sampled, low: float, high: float, column: int, before: bool) -> float:
     """Find the time between two at which a limit changes."""
-    for _ in range(_HALVINGS):
+    for _ in range(HALVINGS):
         middle = (low + high) / 2
         if bool(_margins(move, np.array([middle]))[0, column] < 0) == before:
             low = middle

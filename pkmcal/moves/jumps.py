@@ -12,7 +12,7 @@ from pkmcal.core.driven import DrivenMachine
 from pkmcal.kinematics.robot import Robot
 from pkmcal.moves.peaks import STEPS
 
-_HALVINGS = 50  # of a step, to the time a node is passed
+HALVINGS = 50  # of a step, to the time at which something changes: to rounding
 _STRAIGHT = 1e-12  # of the steepest piece: a node that bends a table by less is none
 _LISTED = 3  # of the jumps of a move, in print
 
@@ -64,7 +64,7 @@ def jumps(
     if not found:
         return ()
     low, high, at, places, before = (np.array(each) for each in zip(*found, strict=True))
-    for _ in range(_HALVINGS):
+    for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         same = (actuators(middle)[np.arange(len(at)), at] > places) == before
         low, high = np.where(same, middle, low), np.where(same, high, middle)

@@ -188,7 +188,7 @@ def known_kind(kind: Planned) -> Planned:
 
 
 def name_of(kind: Planned) -> str:
-    """The word of a kind."""
+    """Return the word that stands for a kind of reading."""
     return as_reading(kind).name
 
 

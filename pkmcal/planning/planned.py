@@ -18,6 +18,7 @@ from pkmcal.estimation.identifiability import as_sum, sparse_basis
 from pkmcal.estimation.parameters import Asked, Parameters, Prior
 from pkmcal.estimation.starts import with_starts
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
+from pkmcal.fitted.machine_accuracy import UNDETERMINED
 from pkmcal.geometry.carried import Load
 from pkmcal.kinematics import pose_steps
 from pkmcal.kinematics.calibratable import Calibratable
@@ -36,7 +37,6 @@ UNKNOWN: tuple[Unknown, ...] = ("frame", "target")
 _MANY = 12  # equations of a pose, such as a picture has
 _TOGETHER = 1024  # targets of which derivatives are made at once, as many as caches hold
 _NOTHING = 1e-12  # share of what the most telling direction is told, that is rounding
-_UNIDENTIFIABLE = 1e-3  # mm a target moves per mm along an unidentifiable combination
 
 
 def planned(
@@ -275,7 +275,7 @@ def design_of(
 
     made = design(aimed)
     moved = aimed.reshape(-1, len(chosen)) @ made.unidentifiable
-    if np.abs(moved).max(initial=0.0) <= _UNIDENTIFIABLE:
+    if np.abs(moved).max(initial=0.0) <= UNDETERMINED:
         return made, False
     motions = _rigid_motions(aims[:, :3])
     if mounted:  # points of the platform, as far from its origin everywhere
@@ -284,9 +284,9 @@ def design_of(
     motions = along @ motions
     rigid = column_basis(motions.reshape(-1, motions.shape[2]))
     within = rigid.T @ moved
-    if np.abs(moved - rigid @ within).max() <= _UNIDENTIFIABLE * np.abs(moved).max():
+    if np.abs(moved - rigid @ within).max() <= UNDETERMINED * np.abs(moved).max():
         ways, sizes, _ = np.linalg.svd(within)
-        frame = rigid @ ways[:, : np.count_nonzero(sizes > _UNIDENTIFIABLE * sizes[0])]
+        frame = rigid @ ways[:, : np.count_nonzero(sizes > UNDETERMINED * sizes[0])]
         flat = aimed.reshape(len(moved), -1)
         return design((flat - frame @ (frame.T @ flat)).reshape(aimed.shape)), True
     first = sparse_basis(made.unidentifiable, chosen.names)[:, 0]

@@ -9,9 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, IntArray
-
-_ALIKE = 1e-9  # share of the way by which a reversal must shorten it; rounding gains less
+from pkmcal.arrays import TIED_CLOSELY, FloatArray, IntArray
 
 
 def short_tour(places: FloatArray, start: FloatArray) -> tuple[IntArray, float]:
@@ -43,7 +41,7 @@ def short_tour(places: FloatArray, start: FloatArray) -> tuple[IntArray, float]:
         order.append(min(left, key=lambda i: (round(float(way[order[-1], i]), 9), i)))
         left.remove(order[-1])
     tour = np.array(order)
-    least = _ALIKE * float(way.max(initial=0.0))
+    least = TIED_CLOSELY * float(way.max(initial=0.0))
     shorter = True
     while shorter:
         shorter = False

@@ -103,7 +103,7 @@ class Angle(Reading):
         return np.array(solve(m.actuators, "q").passive[:, [which]])
 
     def difference(self, values: FloatArray, predicted: FloatArray) -> FloatArray:
-        """The short way round."""
+        """Return differences of angles, the short way round."""
         return wrapped(super().difference(values, predicted))
 
     def of_rows(

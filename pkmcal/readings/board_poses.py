@@ -9,18 +9,22 @@ Own code: a table of pixels is enough to calibrate a machine, without a library 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.core import instruments, screws
+from pkmcal.core.elimination import PoseEquations
 from pkmcal.readings import orientation
 from pkmcal.readings.alignment import nearest_rotations
 from pkmcal.statistics.distributions import f_tail
 
 FEWEST = 4  # corners of a picture that tell where a flat board is; of another one two more
 _UNBENDING = 20  # rounds of undoing the distortion
+_UNBENT = 1e-15  # change of a direction at which it is undone
+_LOST = 0.05  # of the extent in a picture, by which its corners are off where the search is lost
 _STEPS = 30  # of Levenberg and Marquardt
 _DAMPED = 1e-12  # at least, so that corners in a point or a line have a step
 _SMALL = 1e-10  # step, as a share of the distance and in rad, at which a place is found
@@ -67,15 +71,25 @@ def board_poses(
     picture : ndarray of int (N,)
         Which picture each is of, 0 … P - 1. Four corners of a flat board, or six, are needed.
     """
-    lens = np.broadcast_to(lens, (len(pixel), 9)).copy()
+    order = np.argsort(picture, kind="stable")
+    corner, pixel, picture = corner[order], pixel[order], picture[order]
+    lens = np.broadcast_to(lens, (len(pixel), 9))[order]
     direction = unbent(pixel, lens)
     folded = ~np.isfinite(direction).all(axis=1)  # with a lens of other pictures: a guess will do
     direction[folded] = (pixel[folded] - lens[folded, 2:4]) / lens[folded, :2]
     found = [
         _refined(guess, corner, pixel, lens, picture)
-        for guess in _guessed(corner, direction, picture)
+        for guess in _guessed(corner, direction, picture, _projection)
     ]
     pose, rms = (np.stack(each, axis=1) for each in zip(*found, strict=True))
+    lost = np.flatnonzero(~(rms.min(axis=1) <= _LOST * _extents(pixel, picture)))
+    if len(lost):
+        rows, among = _of_pictures(lost, picture, len(pose))
+        some = corner[rows], pixel[rows], lens[rows], among
+        for i, guess in enumerate(_guessed(some[0], direction[rows], among, _affinity)):
+            again, off = _refined(guess, *some)
+            better = off < rms[lost, i]
+            pose[lost[better], i], rms[lost[better], i] = again[better], off[better]
     turn = orientation.between(pose[:, 1, 3:], pose[:, 0, 3:])
     swap = rms[:, 1] < rms[:, 0]
     pose[swap], rms[swap] = pose[swap, ::-1], rms[swap, ::-1]
@@ -105,7 +119,12 @@ def unbent(pixel: FloatArray, lens: FloatArray) -> FloatArray:
         level[:, :2], level[:, 2] = found, 1.0
         seen, by_twist, *_ = instruments.pixels(level, corner, lens)
         off = seen - pixel
-        found = found - np.linalg.solve(by_twist[:, :, 3:5], off[:, :, None])[:, :, 0]
+        (a, b), (c, d) = by_twist[:, :, 3:5].transpose(1, 2, 0)
+        step = np.array([d, -c]) * off[:, 0] + np.array([-b, a]) * off[:, 1]
+        step /= a * d - b * c
+        found -= step.T
+        if not (np.abs(step) > _UNBENT).any():
+            break
     found[~(np.abs(off).max(axis=1) < 1e-6 * lens[:, 0])] = np.nan
     return found
 
@@ -155,19 +174,41 @@ def mm_per_pixel(corner: FloatArray, pixel: FloatArray, picture: IntArray) -> Fl
     return found
 
 
+def _of_pictures(some: IntArray, picture: IntArray, pictures: int) -> tuple[IntArray, IntArray]:
+    """Rows (n,) of some pictures, and which of these each is of (n,)."""
+    among = np.full(pictures, -1)
+    among[some] = np.arange(len(some))
+    rows = np.flatnonzero(among[picture] >= 0)
+    return rows, among[picture[rows]]
+
+
+def _extents(pixel: FloatArray, picture: IntArray) -> FloatArray:
+    """Rms distance of pixels (N, 2) from the middle of their picture (P,)."""
+    count = np.bincount(picture)
+    off = pixel - (summed(pixel, picture) / count[:, None])[picture]
+    extent: FloatArray = np.sqrt(summed((off**2).sum(axis=1), picture) / count)
+    return extent
+
+
 def _guessed(
-    corner: FloatArray, direction: FloatArray, picture: IntArray
+    corner: FloatArray,
+    direction: FloatArray,
+    picture: IntArray,
+    projected: Callable[[FloatArray, FloatArray, IntArray], FloatArray],
 ) -> tuple[FloatArray, FloatArray]:
-    """Two places (P, 6) each to search from; of a board that is not flat they are one."""
+    """Two places (P, 6) each to search from; of a board that is not flat they are one.
+
+    `projected` finds the projection of each picture.
+    """
     middle = corner.mean(axis=0)
     axes = np.linalg.svd(corner - middle, full_matrices=False)[2]
     axes[2] *= np.sign(np.linalg.det(axes))
     own = (corner - middle) @ axes.T  # the board from its middle, the third axis across it
     size = float(np.abs(own).max())
     if float(np.abs(own[:, 2]).max()) < _FLAT * size:
-        turns, place = _of_flat(_projection(own[:, :2] / size, direction, picture), size)
+        turns, place = _of_flat(projected(own[:, :2] / size, direction, picture), size)
     else:
-        projection = _projection(own / size, direction, picture)
+        projection = projected(own / size, direction, picture)
         scale = np.cbrt(np.abs(np.linalg.det(projection[:, :, :3])))[:, None]
         turns = [nearest_rotations(projection[:, :, :3] / scale[:, None])] * 2
         place = projection[:, :, 3] * size / scale
@@ -198,6 +239,23 @@ def _projection(point: FloatArray, direction: FloatArray, picture: IntArray) -> 
     found[:, :2] += middle[:, :, None] * found[:, 2:]
     before: FloatArray = found * np.where(found[:, 2:, -1:] < 0, -1.0, 1.0)
     return before
+
+
+def _affinity(point: FloatArray, direction: FloatArray, picture: IntArray) -> FloatArray:
+    """Return `_projection` as if from far away: three points tell it of a flat board.
+
+    Four tell a projection, but not where three of them are in a line.
+    """
+    point = np.column_stack([point, np.ones(len(point))])
+    squares = summed(point[:, :, None] * point[:, None, :], picture)
+    products = summed(point[:, :, None] * direction[:, None, :], picture)
+    found = np.zeros((len(squares), 3, point.shape[1]))
+    found[:, :2] = (np.linalg.pinv(squares, hermitian=True) @ products).transpose(0, 2, 1)
+    if point.shape[1] > 3:
+        third = np.cross(found[:, 0, :3], found[:, 1, :3])
+        found[:, 2, :3] = third / np.sqrt(np.linalg.norm(third, axis=1, keepdims=True))
+    found[:, 2, -1] = 1.0
+    return found
 
 
 def _of_flat(plane: FloatArray, size: float) -> tuple[list[FloatArray], FloatArray]:
@@ -261,8 +319,7 @@ def _refined(
         damped = scaled + damping[moving, None, None] * np.eye(6)
         step = np.linalg.solve(damped, (pull[moving] / size)[:, :, None])[:, :, 0] / size
         trial = _moved(pose[moving], step)
-        rows = np.flatnonzero(np.isin(picture, moving))
-        among = np.searchsorted(moving, picture[rows])
+        rows, among = _of_pictures(moving, picture, len(pose))
         new = _equations(trial, corner[rows], pixel[rows], lens[rows], among)
         better = new[0] <= cost[moving]
         pose[moving[better]] = trial[better]
@@ -280,16 +337,15 @@ def _equations(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Sum of squares (P,), normal matrix (P, 6, 6) and right side (P, 6) by the board's twist.
 
-    Infinite where a corner is not before the camera.
+    Infinite where a corner is not before the camera. Rows are picture by picture.
     """
     at = np.ascontiguousarray(pose[picture])
     seen, by_twist, _, _, depth = instruments.pixels(at, corner, lens)
     seen[~(depth > 0)] = np.inf
-    off = pixel - seen
-    with np.errstate(invalid="ignore"):
-        squares = summed((off**2).sum(axis=1), picture)
-        normal = summed(by_twist.transpose(0, 2, 1) @ by_twist, picture)
-        pull = summed((by_twist.transpose(0, 2, 1) @ off[:, :, None])[:, :, 0], picture)
+    off = (pixel - seen).ravel()
+    numbers = 2 * np.bincount(picture, minlength=len(pose))
+    of_pictures = PoseEquations(np.arange(len(off)), numbers, 6)
+    normal, pull, squares = of_pictures.normals(off, by_twist.reshape(-1, 6))
     return np.where(np.isfinite(squares), squares, np.inf), normal, pull
 
 
@@ -301,7 +357,11 @@ def _moved(pose: FloatArray, twist: FloatArray) -> FloatArray:
 
 def summed(rows: FloatArray, picture: IntArray, pictures: int = 0) -> FloatArray:
     """Sums (P, ...) of the rows of each picture; there are `pictures` at least."""
-    columns = rows.reshape(len(rows), -1).T
-    total = np.stack([np.bincount(picture, column, pictures) for column in columns], axis=1)
-    found: FloatArray = total.reshape(len(total), *rows.shape[1:]).astype(np.float64, copy=False)
+    count = np.bincount(picture, minlength=pictures)
+    if (picture[1:] < picture[:-1]).any():
+        rows = rows[np.argsort(picture, kind="stable")]
+    found = np.zeros((len(count), *rows.shape[1:]))
+    shown = count > 0
+    if shown.any():
+        found[shown] = np.add.reduceat(rows, (np.cumsum(count) - count)[shown])
     return found

@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike
 from pkmcal.arguments import word
 from pkmcal.arrays import FloatArray, IntArray, as_rows, first_of_equal
 from pkmcal.core import instruments, screws
+from pkmcal.core.poses import NOWHERE
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.csv_table import Table
 from pkmcal.readings import rows, twists
@@ -39,7 +40,7 @@ from pkmcal.readings.lens import (
 from pkmcal.readings.lens_doubts import lens_doubts, pixels_outside
 from pkmcal.readings.lens_files import read_lens, write_lens
 from pkmcal.readings.measured import InFit, Measured
-from pkmcal.readings.pictures import Picture, pictures
+from pkmcal.readings.pictures import Picture, of_pictures_that_are_fitted, pictures
 from pkmcal.readings.predicted import At, Lots, Predicted, Shared
 from pkmcal.readings.reading import HeldNumbers, Reading, Sets, Solve
 from pkmcal.readings.seen_places import tool_places
@@ -48,7 +49,6 @@ from pkmcal.readings.unknowns import PLACE, Dependence, Numbers, Start, always
 from pkmcal.readings.unknowns import Found as Starts
 
 Mount = Literal["base", "platform"]
-_NOWHERE = np.zeros(6)
 _NO_SIZE = np.zeros(1)
 
 
@@ -280,15 +280,22 @@ class Camera(Reading):
         return self.shared(at, Lots(of, first), **numbers).of_rows()
 
     def lots(self, m: Measured) -> IntArray:
-        """Pictures."""
+        """Rows in lots, one for each picture."""
         return self._pictures(m)
+
+    def not_apart(self, m: Measured, fitted: Measured) -> str:
+        """Corners of a picture are not apart from its other ones."""
+        return of_pictures_that_are_fitted(
+            m.actuators, self._corners(len(m)),
+            fitted.actuators, fitted.instrument._corners(len(fitted)),
+        )  # fmt: skip
 
     def shared(
         self,
         at: At,
         lots: Lots,
-        tool: FloatArray = _NOWHERE,
-        tool_origin: FloatArray = _NOWHERE,
+        tool: FloatArray = NOWHERE,
+        tool_origin: FloatArray = NOWHERE,
         corner: FloatArray | None = None,
         lens: FloatArray | None = None,
         size: FloatArray = _NO_SIZE,
@@ -296,7 +303,7 @@ class Camera(Reading):
     ) -> Shared:
         """Return `predict` through the motion of each picture's board before the camera."""
         count = len(at.pose)
-        frame = _NOWHERE if at.frame is None else at.frame
+        frame = NOWHERE if at.frame is None else at.frame
         pose, origin, within = (
             np.ascontiguousarray(np.broadcast_to(each, (count, 6))[lots.first])
             for each in (at.pose, tool_origin, tool)
@@ -519,7 +526,7 @@ class Camera(Reading):
         return rows.of_names(table, {"camera": self.camera_name, "board": self.board_name})
 
     def found_in(self, table: Table) -> list[str]:
-        """Columns u and v."""
+        """Return where pixels are found in a table: columns u and v."""
         return ["u, v"] if {"u", "v"} <= table.columns.keys() else []
 
     def names(self, table: Table) -> set[str]:

@@ -20,7 +20,7 @@ class Closure(Reading):
     name = "closure"
 
     def predict(self, at: At, **numbers: FloatArray) -> Predicted:
-        """No readings (N, 0)."""
+        """Predict nothing, (N, 0): nothing is read beside the actuators."""
         return Predicted(np.empty((len(at.pose), 0)), np.empty((len(at.pose), 0, 6)))
 
     def found_in(self, table: Table) -> list[str]:

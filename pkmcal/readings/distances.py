@@ -168,7 +168,7 @@ class Between(Reading):
         return Predicted(distance[:, None], by_twist, {"target": by_target}, by_other=by_other)
 
     def dependences(self, data: InFit) -> Iterator[Dependence]:
-        """The target."""
+        """Return what distances depend on beside the machine: their targets."""
         yield point(data.measured, "target", "target", data.unknown_target)
 
     def simulated(self, m: Measured, solve: Solve) -> FloatArray:

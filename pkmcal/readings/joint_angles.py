@@ -42,7 +42,7 @@ def place_of(machine: Calibratable, joint: str) -> int:
 
 def follows_pose(machine: Calibratable, joint: str) -> bool:
     """Return whether the angle of a joint follows from the pose: of a pulley's swivel it does."""
-    return machine.model.chains is None
+    return machine.model.closed_form
 
 
 def swivels(

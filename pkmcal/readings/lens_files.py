@@ -37,6 +37,8 @@ _SIGMA_OF_PARTS = (("cameramatrix_std_dev", 4), ("dist_coeffs_std_dev", 5))
 _COVARIANCE = "lens_covariance"
 _RESOLUTION = "cameraresolution"  # of OpenCV's interactive calibration: width and height
 _SIZE = {"width": ("image_width", "width"), "height": ("image_height", "height")}
+_ROI = ("x_offset", "y_offset", "width", "height")  # of ROS, in pixels of the whole sensor
+_BINNING = ("binning_x", "binning_y")  # of ROS: pixels that are one of a picture; 0 is 1
 _DATA = ("data", "matrix", "")  # where numbers of a matrix are; "": in the lines below its name
 _APART = 1e-6  # of two focal lengths in proportion, by which they differ nevertheless
 _NAMES = ("k1", "k2", "p1", "p2", "k3")
@@ -48,8 +50,9 @@ _NOTHING = ("", "None", "null", "~")
 def read_lens(path: str | PathLike[str]) -> dict[str, Any]:
     """Read fx fy cx cy k1 k2 p1 p2 k3; where they are stated width, height and lens_sigma.
 
-    Standard deviations are those of OpenCV's calibrations, stdDeviationsIntrinsics or as its
-    interactive calibration writes them. lens_covariance is (9, 9).
+    Of ``camera_info`` with binning_x, binning_y or roi they are those of the pictures, not of the
+    whole sensor. Standard deviations are those of OpenCV's calibrations, stdDeviationsIntrinsics or
+    as its interactive calibration writes them. lens_covariance is (9, 9).
 
     Raises
     ------
@@ -113,15 +116,71 @@ def read_lens(path: str | PathLike[str]) -> dict[str, Any]:
         zip(("fx", "cx", "fy", "cy"), (matrix[i] for i in (0, 2, 4, 5)), strict=True)
     )
     lens |= dict(zip(_NAMES, bent, strict=False))
+    lens |= _size(known)
+    sigma = _sigma(known, str(file))
+    if sigma is not None:
+        lens["lens_sigma"] = sigma
+    return _of_a_part(lens, known, str(file))
+
+
+def _size(known: Mapping[str, Any]) -> dict[str, int]:
+    """Width and height, those that are stated."""
+    resolution, found = _numbers(known.get(_RESOLUTION)), dict[str, int]()
+    if len(resolution) == 2:
+        found = {"width": int(resolution[0]), "height": int(resolution[1])}
     for name, words in _SIZE.items():
         size = _numbers(_first(known, words))
         if len(size) == 1:
-            lens[name] = int(size[0])
-    resolution = _numbers(known.get(_RESOLUTION))
-    if len(resolution) == 2:
-        lens = {"width": int(resolution[0]), "height": int(resolution[1])} | lens
-    sigma = _sigma(known, str(file))
-    return lens if sigma is None else lens | {"lens_sigma": sigma}
+            found[name] = int(size[0])
+    return found
+
+
+def _of_a_part(lens: dict[str, Any], known: Mapping[str, Any], file: str) -> dict[str, Any]:
+    """The lens of pictures of a part of the sensor, or with pixels put together, as ROS has them.
+
+    Matrix, width and height of ``camera_info`` are those of the whole sensor, pixel by pixel. The
+    first of b pixels that are put together has its middle (b - 1)/2 before theirs.
+    """
+    roi = known.get("roi")
+    if isinstance(roi, str) and (inside := roi.strip()).startswith("{"):
+        roi = dict(each.partition(":")[::2] for each in inside.strip("{} ").split(","))
+        roi = {name.strip(): value.strip() for name, value in roi.items()}
+    if roi not in (None, *_NOTHING) and not isinstance(roi, Mapping):
+        raise FileError(f"{file}: roi: expected {', '.join(_ROI)}; found {str(roi)[:60]}")
+    part = [_whole(roi, name, f"{file}: roi: ") for name in _ROI]
+    binning = [_whole(known, name, f"{file}: ") or 1 for name in _BINNING]
+    covariance = np.eye(9)
+    for i, (focal, middle, side) in enumerate((("fx", "cx", "width"), ("fy", "cy", "height"))):
+        first, count, together = part[i], part[2 + i], binning[i]
+        end = lens.get(side, 0)
+        if end and first + count > end:
+            raise FileError(
+                f"{file}: roi: pixels {first} to {first + count} are not within {side} {end}"
+            )
+        lens[focal] /= together
+        lens[middle] = (lens[middle] - first) / together + 0.5 * (1.0 / together - 1.0)
+        covariance[[i, 2 + i], [i, 2 + i]] /= together
+        if side in lens:
+            lens[side] = (count or end) // together
+        elif count:
+            lens[side] = count // together
+    if "lens_sigma" in lens:
+        lens["lens_sigma"] = covariance @ lens["lens_sigma"] @ covariance
+    return lens
+
+
+def _whole(known: Any, name: str, where: str) -> int:
+    """A whole number from 0 on under a name; 0 where there is none."""
+    value = known.get(name) if isinstance(known, Mapping) else None
+    try:
+        found = float(0 if value is None or str(value).strip() in _NOTHING else value)
+    except (TypeError, ValueError):
+        found = -1.0
+    if found < 0 or not found.is_integer():
+        raise FileError(
+            f"{where}{name}: expected a whole number from 0 on; found {str(value).strip()}"
+        )
+    return int(found)
 
 
 def _distortion(known: Mapping[str, Any], file: str) -> list[float]:

@@ -42,7 +42,7 @@ def turned(angles: FloatArray, vectors: FloatArray) -> FloatArray:
 
 
 def shortest(angles: FloatArray) -> FloatArray:
-    """The triple (N, 3) of the same orientation whose β is within ±90°."""
+    """Return the angles (N, 3) of an orientation with β within ±90°."""
     return turned(angles, np.zeros_like(angles))
 
 

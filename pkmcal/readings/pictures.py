@@ -107,6 +107,26 @@ def pictures(
     return found
 
 
+def of_pictures_that_are_fitted(
+    actuators: FloatArray, corner: FloatArray, fitted: FloatArray, fitted_corner: FloatArray
+) -> str:
+    """Say that corners to be held out are of pictures of which others are fitted; "" if not.
+
+    Of a picture taken again at these actuators (N, n) the same corners (N, 3) are fitted as well.
+    """
+    places = {row.tobytes() for row in fitted}
+    known = {row.tobytes() for row in np.hstack([fitted, fitted_corner])}
+    both = np.hstack([actuators, corner])
+    there = np.array([row.tobytes() in places for row in actuators])
+    again = np.array([row.tobytes() in known for row in both])
+    if not there.any() or again.any():
+        return ""
+    return (
+        f"{int(there.sum())} rows are corners of pictures whose other corners are fitted: all share"
+        " the pose and its error, and agree however good the machine is; hold out whole pictures"
+    )
+
+
 def _rms(off: FloatArray) -> float:
     """Distance in the picture, rms, of corners whose two numbers are off by these."""
     return float(np.sqrt(2.0 * np.mean(off**2)))

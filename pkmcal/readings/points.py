@@ -38,7 +38,7 @@ class Position(Reading):
         return points(at.pose, target, at.frame, at.origin)
 
     def dependences(self, data: InFit) -> Iterator[Dependence]:
-        """The target."""
+        """Return what points depend on beside the machine: their targets."""
         yield point(data.measured, "target", "target", data.unknown_target)
 
     def frame(self, seen: Sighting) -> Laid:
@@ -75,7 +75,7 @@ class Height(Position):
         return of_heights(seen.values, seen.point), {}
 
     def found_in(self, table: Table) -> list[str]:
-        """Column z alone."""
+        """Return where heights are found in a table: column z alone."""
         alone = "z" in table.columns and table.columns.keys().isdisjoint(("x", "y"))
         return [PLACE_TITLE] if alone and not is_turned(table.columns) else []
 

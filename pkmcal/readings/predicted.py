@@ -11,10 +11,10 @@ import numpy as np
 
 from pkmcal.arguments import kind
 from pkmcal.arrays import FloatArray, IntArray, chained
+from pkmcal.core.poses import NOWHERE
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError, Error
 from pkmcal.readings.measured import Measured
 
-NOWHERE = np.zeros(6)
 MOTION = 6  # numbers of the motion of a lot of rows: ω, then v
 
 
@@ -76,6 +76,16 @@ class Predicted:
     by: Mapping[str, FloatArray] = field(default_factory=dict)
     by_frame: FloatArray | None = None
     by_other: FloatArray | None = None
+
+    def some(self, rows: slice) -> Predicted:
+        """Return these of some of the rows."""
+        return Predicted(
+            self.values[rows],
+            self.by_twist[rows],
+            {name: part[rows] for name, part in self.by.items()},
+            None if self.by_frame is None else self.by_frame[rows],
+            None if self.by_other is None else self.by_other[rows],
+        )
 
 
 def require_shape(what: str, found: object, shape: tuple[int, ...]) -> None:

@@ -86,7 +86,7 @@ def units_of(components: Components) -> tuple[str, ...]:
 
 @cache
 def families_by_unit(units: tuple[str, ...]) -> tuple[Family, ...]:
-    """Families of components that have the same of these units."""
+    """Group components by their units into families."""
     return tuple(
         Family(unit, tuple(k for k, each in enumerate(units) if each == unit))
         for unit in dict.fromkeys(units)
@@ -236,6 +236,10 @@ class Reading:
         None: rows have nothing in common, and `predict` is all there is.
         """
         return None
+
+    def not_apart(self, m: Measured, fitted: Measured) -> str:
+        """The reason why rows tell nothing that is held out of others; "" where they do."""
+        return ""
 
     def shared(self, at: At, lots: Lots, **numbers: FloatArray) -> Shared:
         """Compute `predict` through the motions of lots of rows at one place each.

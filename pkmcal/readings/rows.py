@@ -38,7 +38,7 @@ def of_actuators(
 
 
 def signs(name: str, given: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
-    """1, -1 or 0 of each actuator (N, n), likewise."""
+    """Sign of each actuator's approach (N, n): 1, -1 or 0."""
     found = of_actuators(name, given, shape)
     if not np.isin(found, (-1.0, 0.0, 1.0)).all():
         raise ArgumentError(f"{name} must be 1, -1 or 0 for each actuator")

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from pkmcal.arguments import shown, word
 from pkmcal.arrays import FloatArray, IntArray, TextArray, as_rows
 from pkmcal.core import instruments
+from pkmcal.core.poses import NOWHERE
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.files.csv_table import Table
 from pkmcal.files.csv_writer import WrittenColumn
@@ -27,7 +28,7 @@ from pkmcal.readings.known_distances import (
 )
 from pkmcal.readings.measured import InFit, Measured
 from pkmcal.readings.points import ORIGIN, points, some_components
-from pkmcal.readings.predicted import NOWHERE, At, Predicted
+from pkmcal.readings.predicted import At, Predicted
 from pkmcal.readings.reading import Components, Reading, Sets
 from pkmcal.readings.unknowns import PLACE, POINT, Dependence, Found, Start, always, point
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from pkmcal.arrays import FloatArray, as_rows
 from pkmcal.core import instruments
-from pkmcal.core.poses import compose
+from pkmcal.core.poses import NOWHERE, compose
 from pkmcal.files.column_names import is_turned, orientation_in
 from pkmcal.files.csv_table import Table
 from pkmcal.readings import orientation
@@ -30,7 +30,6 @@ from pkmcal.readings.reading import Reading, Sets
 from pkmcal.readings.unknowns import ANGLES, PLACE, Dependence, Found, Start, always
 
 _ORIGIN = np.zeros(3)
-_NOWHERE = np.zeros(6)
 _UP = np.array([0.0, 0.0, 1.0])
 _AXES = ("x", "y", "z")
 
@@ -50,7 +49,7 @@ class Pose(Reading):
         self,
         at: At,
         tool: FloatArray | None = None,
-        tool_origin: FloatArray = _NOWHERE,
+        tool_origin: FloatArray = NOWHERE,
         **numbers: FloatArray,
     ) -> Predicted:
         """Pose of the platform, or of `tool` (N, 6) on it, counted from `tool_origin` (N, 6)."""
@@ -159,7 +158,7 @@ class Tilt(Orientation):
         _mounted(sets, found, _of_tilts)
 
     def found_in(self, table: Table) -> list[str]:
-        """Columns of the tilts."""
+        """Return where tilts are found in a table."""
         return Reading.found_in(self, table)
 
 

@@ -9,10 +9,10 @@ import numpy as np
 from pkmcal.arrays import FloatArray, IntArray, rms
 from pkmcal.calibration.identification import Identification
 from pkmcal.measurements.iso230 import axis_performance
+from pkmcal.measurements.iso9283 import SIGMAS
 from pkmcal.measurements.repeats import targets
 from pkmcal.statistics.linear_fit import numbered
 
-_SIGMAS = 3.0  # of the spread, in ISO 9283's repeatability of an angle
 _AXES = (("x", "mm"), ("y", "mm"), ("z", "mm"), ("a", "rad"), ("b", "rad"), ("c", "rad"))
 _FLAT = 1e-6  # of the largest singular value: targets on a line do not show how a platform turns
 
@@ -62,7 +62,7 @@ def axes(found: Identification) -> list[dict[str, Any]]:
             row[f"mean_{when}"] = _mean_size(values, pose[seen])
             row[f"rms_{when}"] = rms(values)
             row["targets"], row["repeated"] = scored.targets, scored.repeated
-            row["spread"] = _SIGMAS / 4.0 * scored.repeatability
+            row["spread"] = SIGMAS / 4.0 * scored.repeatability
         table.append(row)
     return table
 

@@ -224,6 +224,7 @@ def iso9283(found: Identification) -> list[dict[str, Any]]:
     Without outliers, which are errors of the measurement.
     """
     equations = found.fit.equations
+    before = equations.prediction.values(found.fit.start)
     scores = []
     for i, measured in enumerate(equations.table.sets):
         if not measured.instrument.is_place:
@@ -236,7 +237,7 @@ def iso9283(found: Identification) -> list[dict[str, Any]]:
             continue
         group = np.unique(groups(measured)[read], return_inverse=True)[1]
         values = measured.values[read, :3]
-        first = performance(values, found.fit.start.predicted[i][read, :3], group)
+        first = performance(values, before[i][read, :3], group)
         last = performance(values, values - found.residuals[i][read, :3], group)
         scores.append({
             "set": i + 1,

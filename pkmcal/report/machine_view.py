@@ -17,7 +17,7 @@ from pkmcal.kinematics.robot import Robot
 from pkmcal.report.drawing import sample
 from pkmcal.report.exaggerated import middle_exaggerated
 from pkmcal.report.rows import rows
-from pkmcal.view import page, parallel
+from pkmcal.view import page
 
 _MORE = 10  # times the exaggeration that is drawn at first
 _POSES = 200  # measured poses that can be visited
@@ -29,7 +29,7 @@ def element(found: Identification) -> tuple[str, str]:
     Both are empty for a machine that the page cannot hold: the still pictures stay.
     """
     robot = found.robot
-    if isinstance(robot, Robot) and parallel.beyond(robot.model):
+    if page.beyond(robot):
         return "", ""
     data = page.machine(robot, cloud=False)  # the report has its own pictures of the workspace
     data["places"] = measured_poses(found)

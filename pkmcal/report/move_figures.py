@@ -8,10 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pkmcal import display, screw
+from pkmcal import display
 from pkmcal.arrays import FloatArray, as_rows
-from pkmcal.core.library import SLOTS
-from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.kinematics.robot import Robot
 from pkmcal.report.drawing import BLUE, FAINT, ORANGE, empty_figure, in_context
 
@@ -117,19 +115,10 @@ def in_space(robot: Robot, poses: ArrayLike, labels: Sequence[str], title: str) 
 
 def places(robot: Robot, own: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return base joints (limbs, 3), anchors and platform joints (N, limbs, 3) at own poses."""
-    if robot.model.chains is not None:
-        chains = robot.chain_points(own, robot.machine.inverse(robot.slots, own))
-        base = np.array([chain[0, 0] for chain in chains])
-        anchors, joints = (np.stack([c[:, k] for c in chains], axis=1) for k in (-2, -1))
-        return base, anchors, joints
-    slots = robot.slots
-    _, direction, _ = robot.limb_machine.limbs(slots, own)
-    platform = np.column_stack([slots[:, 3:6], np.ones(len(slots))])
-    joints = (screw.from_pose(own) @ platform.T).transpose(0, 2, 1)[..., :3]
-    rods = slots[:, SLOTS.index("rod")]
-    carried = np.array([KINDS[limb.kind].driver.carries for limb in robot.model.limbs])
-    ends = np.where(carried[:, None], joints - rods[:, None] * direction, slots[:, 0:3])
-    return slots[:, 0:3], ends, joints
+    limbs = robot.limb_kinematics.lines(robot, own, robot.machine.inverse(robot.slots, own))
+    base = np.array([limb[0, 0] for limb in limbs])
+    anchors, joints = (np.stack([limb[:, k] for limb in limbs], axis=1) for k in (-2, -1))
+    return base, anchors, joints
 
 
 def _ring(points: FloatArray) -> FloatArray:

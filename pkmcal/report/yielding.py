@@ -18,9 +18,9 @@ from pkmcal.kinematics.stiffness import (
     stiffness,
 )
 from pkmcal.report.places import Places
+from pkmcal.view.yielding import WAYS
 
 FORCE = 100.0  # N, of a cut and of the table of one pose
-_WAYS = {"along x": (1.0, 0.0, 0.0), "along y": (0.0, 1.0, 0.0), "along z": (0.0, 0.0, 1.0)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +124,7 @@ def of(robot: Robot | SerialArm, places: Places | None) -> Yielding | None:
 def _ways(found: Stiffness, softest: FloatArray, good: np.ndarray) -> list[Way]:
     if not good.any():
         return []
-    along = {name: found.stiffness_along(way)[good] for name, way in _WAYS.items()}
+    along = {name: found.stiffness_along(way)[good] for name, way in WAYS.items()}
     along["softest"] = softest[good]
     ways = []
     for name, each in along.items():

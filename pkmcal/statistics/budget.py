@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 
 from pkmcal.exceptions import ArgumentError
+from pkmcal.statistics.distributions import MANY
 
 Distribution = Literal["normal", "rectangular", "triangular", "U-shaped"]
 DIVISORS: dict[Distribution, float] = {
@@ -21,7 +22,6 @@ DIVISORS: dict[Distribution, float] = {
     "triangular": 6.0**0.5,
     "U-shaped": 2.0**0.5,
 }
-_MANY = 1e9  # degrees of freedom, beyond which a distribution is its limit
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,7 @@ class Budget:
         """Probability that the interval ±U holds the value, by Student's t."""
         from scipy.special import stdtr
 
-        return float(1.0 - 2.0 * stdtr(min(self.dof, _MANY), -self.factor))
+        return float(1.0 - 2.0 * stdtr(min(self.dof, MANY), -self.factor))
 
 
 def coverage_factor(probability: float, dof: float) -> float:
@@ -116,7 +116,7 @@ def coverage_factor(probability: float, dof: float) -> float:
 
     if not 0.0 < probability < 1.0:
         raise ArgumentError(f"probability must be between 0 and 1, found {probability!r}")
-    return float(stdtrit(min(dof, _MANY), 0.5 + probability / 2.0))
+    return float(stdtrit(min(dof, MANY), 0.5 + probability / 2.0))
 
 
 def standard(half_width: float, distribution: Distribution) -> float:

@@ -101,7 +101,7 @@ class Sandwich:
         return int(self.fit.design.shape[1] + beside)
 
     def _design(self, rows: IntArray | slice) -> FloatArray:
-        """Rows of the design."""
+        """Design of the equations of a lot, in the order of its clusters."""
         own = self.fit.design[rows]
         return own if self.beside is None else np.concatenate([own, self.beside[rows]], axis=-1)
 

@@ -10,7 +10,8 @@ import numpy as np
 from pkmcal.arrays import FloatArray
 
 _QUANTILES = (np.arange(512) + 0.5) / 512.0
-_MANY = 1e9  # degrees of freedom, beyond which a distribution is its limit
+FEW = 10.0  # degrees of freedom below which a scatter, and tests by it, say too little
+MANY = 1e9  # degrees of freedom, beyond which a distribution is its limit
 
 
 def t_factor(freedom: FloatArray) -> FloatArray:
@@ -24,7 +25,7 @@ def t_factor(freedom: FloatArray) -> FloatArray:
     from scipy.special import stdtrit
 
     known = freedom > 0
-    usable = np.where(known, np.minimum(freedom, _MANY), 1.0)
+    usable = np.where(known, np.minimum(freedom, MANY), 1.0)
     factor: FloatArray = np.where(known, stdtrit(usable, 0.975), np.inf)
     return factor
 
@@ -47,7 +48,7 @@ def t_tail(value: float, freedom: float) -> float:
     """Chance of a t variable further from zero on either side."""
     from scipy.special import stdtr
 
-    return float(2.0 * stdtr(min(freedom, _MANY), -abs(value)))
+    return float(2.0 * stdtr(min(freedom, MANY), -abs(value)))
 
 
 def f_tail(ratio: float, first: float, second: float) -> float:
@@ -56,7 +57,7 @@ def f_tail(ratio: float, first: float, second: float) -> float:
 
     if not (first > 0 and second > 0 and np.isfinite(ratio)):
         return float("nan")
-    return float(fdtrc(min(first, _MANY), min(second, _MANY), ratio))
+    return float(fdtrc(min(first, MANY), min(second, MANY), ratio))
 
 
 def f_limit(chance: float, first: float, second: float) -> float:
@@ -71,7 +72,7 @@ def f_limit(chance: float, first: float, second: float) -> float:
 
     if not (first > 0 and second > 0):
         return float("nan")
-    return float(fdtri(min(first, _MANY), min(second, _MANY), 1.0 - chance))
+    return float(fdtri(min(first, MANY), min(second, MANY), 1.0 - chance))
 
 
 def skew_f_tail(ratio: float, first: float, second: float, skewness: float) -> float:
@@ -93,7 +94,7 @@ def skew_f_tail(ratio: float, first: float, second: float, skewness: float) -> f
     if not (np.isfinite(plain) and 0.0 < skewness < first):
         return plain
     noise = np.ones(1)
-    if second < _MANY:
+    if second < MANY:
         noise = 2.0 * gammaincinv(second / 2.0, _QUANTILES) / second
     least = skewness + np.sqrt(skewness * first) * (ratio * noise - 1.0)
     return max(plain, float(gammaincc(skewness / 2.0, np.maximum(least, 0.0) / 2.0).mean()))

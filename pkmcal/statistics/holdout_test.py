@@ -28,7 +28,7 @@ NEARER = 1e-3  # chance below which they are nearer than expected, of a ratio be
 
 @dataclass(frozen=True)
 class HoldoutTest:
-    """The comparison.
+    """Comparison of held-out rows with what a fit lets expect.
 
     Attributes
     ----------
@@ -123,7 +123,7 @@ def holdout_test(
     taken: float = 0.0,
     most: float = np.inf,
 ) -> HoldoutTest:
-    """Compare.
+    """Compare held-out rows with what a fit lets expect.
 
     Parameters
     ----------

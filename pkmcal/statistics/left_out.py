@@ -42,7 +42,7 @@ class LeftOut:
 
 
 def left_out(fit: LinearFit, block: IntArray) -> LeftOut:
-    """Leave each block out.
+    """Compute residuals of each block by a fit without it.
 
     Parameters
     ----------

@@ -14,6 +14,7 @@ from functools import cache, cached_property
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, IntArray, lots
+from pkmcal.statistics.robust_scale import MET
 from pkmcal.statistics.singular_values import svd
 
 ROUNDING = 1e-9  # a singular value below this share of the largest is zero
@@ -21,7 +22,6 @@ _WHOLE = 9  # decimals from which degrees of freedom are whole: limits on them a
 _IN_ONE_THREAD = 8192  # numbers
 _COLUMNS_AT_ONCE = 32  # of a factorisation
 _FEW_COLUMNS = 4  # of one with many columns
-_MET = 1e-6  # share of the largest residual below which a component is met exactly
 _KEYS = 4096  # of rows that are added up at once
 _DENSE = 4  # times as many numbers as equations, below which those there are are ticked off
 
@@ -108,7 +108,7 @@ def met_exactly(residual: FloatArray, component: IntArray) -> BoolArray:
     """
     size = np.abs(residual)
     largest = size.max(initial=0.0)  # where all are 0, no component is unlike the others
-    open_ones = np.bincount(component, size > _MET * largest)
+    open_ones = np.bincount(component, size > MET * largest)
     met: BoolArray = (open_ones[component] == 0.0) & (largest > 0.0)
     return met
 

@@ -13,6 +13,7 @@ each other: the test says that residuals follow the order, not why.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -185,11 +186,12 @@ class Series:
             return None
         shares = (onto @ along).reshape(k, WAVES)
         values, steps = waves @ shares.T, known @ (onto @ along)
-        course = np.concatenate([
-            np.einsum("ij,ij->i", self._own(rows), values[self.visit[rows]])
-            - self._both(steps, rows)
-            for rows in lots(count)
-        ])  # fmt: skip
+
+        def course(rows: slice) -> FloatArray:
+            moved = np.einsum("ij,ij->i", self._own(rows), values[self.visit[rows]])
+            beside: FloatArray = moved - self._both(steps, rows)
+            return beside
+
         return Course(
             chance=f_tail(min(explained / taken / variance, 1e300), taken, freedom),
             explained=explained,
@@ -198,24 +200,23 @@ class Series:
             scatter=np.sqrt(variance) * self._unit,
         )
 
-    def _share(self, explained: FloatArray, spare: float) -> float:
-        """Share of the variance of a component, the largest, of what (E,) is explained.
+    def _share(self, explained: Callable[[slice], FloatArray], spare: float) -> float:
+        """Share of the variance of a component, the largest, of what is explained of rows.
 
         `spare` are the degrees of freedom of an equation.
         """
-        largest = 0.0
-        of = np.concatenate([
-            np.abs(self._own(rows)).argmax(axis=1) for rows in lots(len(self.visit))
-        ])  # fmt: skip
-        for component in np.flatnonzero(self._unit):
-            mine = (self.visit >= 0) & (of == component)
-            before, after = (
-                float((each[mine] ** 2).sum()) for each in (self._left, self._left - explained)
-            )
-            freedom = spare * float(mine.sum())
-            if before > 0:
-                largest = max(largest, 1.0 - after / before * (freedom + WAVES) / freedom)
-        return largest
+        k = self.by_component.shape[1]
+        count, before, after = np.zeros((3, k))
+        for rows in lots(len(self.visit)):
+            mine = self.visit[rows] >= 0
+            of, left = np.abs(self._own(rows)).argmax(axis=1)[mine], self._left[rows][mine]
+            count += np.bincount(of, minlength=k)
+            before += np.bincount(of, left**2, k)
+            after += np.bincount(of, (left - explained(rows)[mine]) ** 2, k)
+        known = (self._unit != 0.0) & (before > 0.0)
+        freedom = spare * count[known]
+        shares = 1.0 - after[known] / before[known] * (freedom + WAVES) / freedom
+        return max(0.0, float(shares.max(initial=0.0)))
 
     def jumped(self, course: Course) -> Course:
         """The course as one jump, where that explains at least as much."""

@@ -25,7 +25,7 @@ _WIDEST = 1e6  # factor on the prior beyond which none is looked for
 
 @dataclass(frozen=True, eq=False)
 class PriorTest:
-    """The comparison.
+    """Comparison of a prior with what measurements say.
 
     Attributes
     ----------

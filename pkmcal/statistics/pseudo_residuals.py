@@ -21,7 +21,7 @@ def pseudo_residuals(
     decline: FloatArray,
     parameters: int,
 ) -> tuple[FloatArray, float, float]:
-    """Compute them.
+    """Compute residuals that robust standard errors are made of, one loss and scale for all.
 
     Parameters
     ----------

@@ -16,7 +16,7 @@ _LEAST_FREEDOM = 5  # below, some rows are always met
 _DRAWS = 100
 _RIDGE = 1e-12  # of a normal matrix that is 1 where all rows have full weight
 _ENOUGH = 100.0  # rows' worth of spare equations from which chance no longer moves a ratio much
-_MET = 1e-6  # share of the first scale below which half of the rows are met exactly
+MET = 1e-6  # share of a scale or largest residual below which an equation is met exactly
 
 
 def median_ratio(squares: FloatArray, components: IntArray) -> float:
@@ -56,7 +56,7 @@ def robust_ratio(design: FloatArray, residual: FloatArray, components: IntArray)
         revised = np.sqrt(np.median(squares / medians) * factor)
         if np.isinf(first_scale):
             first_scale = revised
-        if not revised > _MET * first_scale or abs(revised / scale - 1.0) < _SETTLED:
+        if not revised > MET * first_scale or abs(revised / scale - 1.0) < _SETTLED:
             break
         scale = revised
         weights = np.repeat(1.0 / (1.0 + squares / (scale * _LIMIT) ** 2 / components), components)

@@ -12,15 +12,16 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, lots
+from pkmcal.arrays import FloatArray, IntArray, lots
 from pkmcal.statistics.clusters import Sandwich
 from pkmcal.statistics.distributions import f_tail
 from pkmcal.statistics.linear_fit import LinearFit
 
-_SAME = 1e-6  # share of a column that must be left beside the parameters
+LEFT = 1e-6  # share of a column that must be left beside others, for it to say anything of its own
 
 # Derivatives of the predicted values to held numbers, whitened: equations in their order, and their
 # rows (b, d). They are made anew for each pass: all at once may be larger than the design. Numbers
@@ -137,6 +138,13 @@ def beside(fit: LinearFit, columns: Columns) -> Beside | None:
     if not sums:
         return None
     square, by_basis, pulls = (sum(parts[1:], parts[0]) for parts in zip(*sums, strict=True))
+    return _of_sums(fit, columns, square, by_basis, pulls)
+
+
+def _of_sums(
+    fit: LinearFit, columns: Columns, square: FloatArray, by_basis: FloatArray, pulls: FloatArray
+) -> Beside | None:
+    """Find `beside` by what columns C have with themselves, with the basis and with residuals."""
     size = np.sqrt(np.diag(square))
     known = size > 0.0
     if not known.any():
@@ -144,9 +152,78 @@ def beside(fit: LinearFit, columns: Columns) -> Beside | None:
     unit = np.diag(1.0 / np.where(known, size, 1.0))[:, known]
     inner = by_basis @ unit
     values, ways = np.linalg.eigh(unit.T @ square @ unit - inner.T @ inner)
-    new = values > _SAME
+    new = values > LEFT
     half = unit @ (ways[:, new] / np.sqrt(values[new]))
     return Beside(fit, columns, by_basis, half, half.T @ pulls)
+
+
+@dataclass(frozen=True, eq=False)
+class Jump:
+    """Numbers that have become others in the course of measuring.
+
+    Attributes
+    ----------
+    at : int
+        The first visit at which they are.
+    size : ndarray (d,)
+        By how much.
+    chance : float
+        How likely as much would be explained if they were always the same, times the number of
+        visits at which it was looked for.
+    """
+
+    at: int
+    size: FloatArray
+    chance: float
+
+
+def jump(fit: LinearFit, columns: FloatArray, visit: IntArray, fewest: int) -> Jump | None:
+    """Find from which visit on other numbers explain most; None where nothing can be told.
+
+    Errors count as independent.
+
+    Parameters
+    ----------
+    fit : LinearFit
+        The fit.
+    columns : ndarray (M, d)
+        Derivatives of the predicted values to the numbers, whitened.
+    visit : ndarray of int (M,)
+        In which visit each equation was read, from 0 in the order of measuring.
+    fewest : int
+        Visits before and after.
+
+    Examples
+    --------
+    >>> from pkmcal.statistics.linear_fit import linear_fit
+    >>> rows = np.arange(12)
+    >>> y = np.where(rows < 7, 0.0, 2.0) + 0.01 * (-1.0) ** rows
+    >>> one = np.ones((12, 1))
+    >>> fit = linear_fit(one, y - y.mean(), np.zeros((0, 1)), np.eye(1), rows, 0 * rows)
+    >>> found = jump(fit, one, rows, 2)
+    >>> found.at, round(float(found.size[0]), 2), found.chance < 1e-9
+    (7, 2.0, True)
+    """
+    order = np.argsort(visit, kind="stable")
+    visits = int(visit.max(initial=-1)) + 1
+    ends = np.searchsorted(visit[order], np.arange(visits + 1))
+    parts = [order[a:b] for a, b in pairwise(ends)]
+    sums = [
+        np.cumsum(np.array([one[rows].T @ other[rows] for rows in parts])[::-1], axis=0)[::-1]
+        for one, other in (
+            (columns, columns), (fit.design, columns), (columns, fit.residual),
+        )
+    ]  # fmt: skip
+    tried = dict[int, Beside]()
+    for at in range(fewest, visits - fewest + 1):
+        found = _of_sums(fit, columns_of(columns), *(each[at] for each in sums))
+        if found is not None and len(found.along):
+            tried[at] = found
+    if not tried:
+        return None
+    at = min(tried, key=lambda each: (tried[each].chance, -tried[each].drop))
+    best = tried[at]
+    return Jump(at, best.half @ best.along, min(1.0, len(tried) * best.chance))
 
 
 def score_test(fit: LinearFit, columns: Columns) -> Score | None:

@@ -21,6 +21,7 @@ from pkmcal.statistics.clusters import Sandwich
 from pkmcal.statistics.distributions import f_tail
 from pkmcal.statistics.linear_fit import ROUNDING, LinearFit, column_basis, triangle
 from pkmcal.statistics.prior_test import data_alone
+from pkmcal.statistics.score_test import LEFT
 from pkmcal.statistics.singular_values import svd
 
 _CHANCE = 0.01  # among all candidates, below which one has shifted …
@@ -31,7 +32,6 @@ _EQUAL = 1e-6  # share by which drops and chances differ that are not equal
 TOLD_APART = 6.63
 _FEW = 30  # equations up to which clusters are too few for their own variances
 _TOLD = 0.01  # share of the others of a kind that must be left of each, to be estimated along
-_SAME = 1e-6  # share of a candidate that must be left beside what is there
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +151,7 @@ def _trial(
     """Return the fall of the sum of squares by candidate `j`; None if it adds nothing."""
     beside = columns - common @ (common.T @ columns)
     turn, singular, _ = svd(beside)
-    basis = turn[:, singular > _SAME * float(np.linalg.norm(columns))]
+    basis = turn[:, singular > LEFT * float(np.linalg.norm(columns))]
     freedom = len(y) - common.shape[1] - basis.shape[1]
     if not basis.shape[1] or freedom < 1:
         return None
@@ -206,7 +206,7 @@ def _together(
         whole = np.hstack([whole, _beside(columns, raw, whole)])
     for each in taken:
         along = raw[each.trial.candidate]
-        if not each.named and _left(along, whole) > _SAME:  # else it is told by the others
+        if not each.named and _left(along, whole) > LEFT:  # else it is told by the others
             whole = np.hstack([whole, along])
     _, singular, rows = svd(triangle(whole))
     keep = singular > ROUNDING * singular[0]

@@ -41,6 +41,11 @@ def html(robot: Robot | SerialArm, poses: FloatArray | None = None) -> str:
     )
 
 
+def beyond(robot: Robot | SerialArm) -> str:
+    """List parts of a robot or an arm that the page cannot draw; empty where there are none."""
+    return "" if isinstance(robot, SerialArm) else parallel.beyond(robot.model)
+
+
 def machine(robot: Robot | SerialArm, cloud: bool = True) -> dict[str, Any]:
     """A robot or an arm as the scripts take it; of a robot with a cloud of its workspace."""
     found = serial.data(robot) if isinstance(robot, SerialArm) else parallel.data(robot, cloud)

@@ -10,12 +10,12 @@ from pkmcal.arrays import FloatArray
 from pkmcal.core.chains import ChainMachine
 from pkmcal.core.library import MAPS, POSE, SLOTS
 from pkmcal.core.machine import Machine
-from pkmcal.core.poses import invert
+from pkmcal.core.poses import NOWHERE, invert
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.limb_kinds import KINDS
-from pkmcal.geometry.model import Cone, Model
+from pkmcal.geometry.limbs import Cone
+from pkmcal.geometry.model import Model
 from pkmcal.kinematics.dexterity import dexterity
-from pkmcal.kinematics.frames import NOWHERE
 from pkmcal.kinematics.reading_units import reading_units
 from pkmcal.kinematics.robot import Robot
 from pkmcal.screw import from_pose
@@ -29,7 +29,7 @@ def beyond(model: Model) -> str:
     """List parts of a machine that the page cannot draw; empty where there are none."""
     if model.bent:
         return "tackles" if model.limbs[model.bent[0]].parts else "pulleys"
-    if model.chains is not None and model.chains.layout.loose:
+    if model.mechanism.loose:
         return "chains that hold each other by joints they share"
     return ""
 
@@ -59,8 +59,9 @@ def data(robot: Robot, cloud: bool) -> dict[str, Any]:
     spans = ranges.poses(robot, size, most)
     moves = ranges.actuators(robot, strokes, spans)
     at_home = dexterity(robot, robot.home)
+    shared = machine.struct.shared if isinstance(machine, ChainMachine) else 0
     found = {
-        "kind": "limbs" if model.chains is None else "chains",
+        "kind": "limbs" if model.closed_form else "chains",
         "name": robot.name,
         "what": said,
         "numbers": numbers,
@@ -68,8 +69,8 @@ def data(robot: Robot, cloud: bool) -> dict[str, Any]:
         "map": model.map,
         "free": [POSE.index(name) for name in MAPS[model.map]],
         "moved": [POSE.index(name) for name in spans],
-        "rows": machine.rows + (0 if model.chains is None else machine.struct.shared),
-        "shared": 0 if model.chains is None else machine.struct.shared,
+        "rows": machine.rows + shared,
+        "shared": shared,
         "size": size,
         "length": robot.length,
         "home": robot.home.tolist(),
@@ -93,7 +94,7 @@ def data(robot: Robot, cloud: bool) -> dict[str, Any]:
         poses, found["cloud"] = ranges.cloud(robot, spans)
         if given is not robot:
             found["stiffness"] = yielding.data(given, poses)
-    if model.chains is None:
+    if model.closed_form:
         return found | {"limbs": _limbs(robot, np.array(moves))}
     assert isinstance(machine, ChainMachine)
     return found | chains.looks(robot, machine, slots, drives.ways(robot, np.array(moves).T).T)

@@ -47,9 +47,8 @@ def farthest(robot: Robot, strokes: list[tuple[float, float] | None]) -> float:
     units = robot.actuator_units
     if all(stroke or unit == "rad" for stroke, unit in zip(strokes, units, strict=True)):
         return np.inf
-    chains = robot.model.chains
-    base = [limb[0].at for limb in chains.limbs] if chains is not None else robot.slots[:, :3]
-    return float(np.linalg.norm(np.array(base) - robot.own_home[:3], axis=1).max())
+    base = robot.model.mechanism.base_points(robot.slots)
+    return float(np.linalg.norm(base - robot.own_home[:3], axis=1).max())
 
 
 def _within(robot: Robot, name: str, ends: Sequence[float], most: float) -> tuple[float, float]:
@@ -94,7 +93,7 @@ def modes(robot: Robot) -> dict[str, Any]:
         return {"poses": [], "complete": False}
     found = robot.forward_all(q)
     poses = found.poses
-    if robot.model.chains is not None:  # of passive joints that fold over the page knows nothing
+    if not robot.model.closed_form:  # of passive joints that fold over the page knows nothing
         there = robot.forward(np.repeat(q[None], len(poses), axis=0), poses)
         off = np.linalg.norm(there.pose[:, :3] - poses[:, :3], axis=1)
         poses = poses[there.ok & (off < _SAME * robot.length)]

@@ -10,8 +10,8 @@ import numpy as np
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.core.instruments import seen_points
-from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.kinematics.robot import Robot
+from pkmcal.screw import from_pose
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,39 +54,19 @@ def skeleton(robot: Robot | SerialArm, q: FloatArray, guess: FloatArray) -> Skel
     if not solved.ok:
         return None
     own, _ = robot.own_rows(solved.pose)
-    if robot.model.chains is not None:
-        chains = [points[0] for points in robot.chain_points(own, q[None])]
-        starts, tips = (np.array([chain[k] for chain in chains]) for k in (0, -1))
-        return _placed(robot, chains, starts, tips)
-    slots = robot.slots
-    _, towards, _ = robot.limb_machine.limbs(slots, own)
-    base, platform = np.ascontiguousarray(slots[:, :3]), np.ascontiguousarray(slots[:, 3:6])
-    ends = seen_points(own[0], platform)[0]
-    lines = []
-    for i, limb in enumerate(robot.model.limbs):
-        kind = KINDS[limb.kind]
-        line = [base[i], ends[i]]
-        if kind.driver.carries:  # the joint that the slider or crank carries
-            rod = robot.geometry[f"rod{i + 1}"]
-            line.insert(1, ends[i] - rod * towards[0, i])
-        lines.append(np.array(line))
-    return _placed(robot, lines, base, ends, _around(platform))
+    lines = [limb[0] for limb in robot.limb_kinematics.lines(robot, own, q[None])]
+    return _placed(robot, lines, from_pose(own)[0])
 
 
-def _placed(
-    robot: Robot,
-    lines: Sequence[FloatArray],
-    base: FloatArray,
-    ends: FloatArray,
-    order: IntArray | None = None,
-) -> Skeleton:
-    """Limbs and outlines in the robot's base frame; the platform's in the order given."""
+def _placed(robot: Robot, lines: Sequence[FloatArray], platform: FloatArray) -> Skeleton:
+    """Limbs and outlines in the robot's base frame, by the motion (4, 4) of the platform."""
     frame = robot.model.base_frame
     outward = np.zeros(6) if frame is None else frame
+    base, ends = (np.array([line[k] for line in lines]) for k in (0, -1))
     return Skeleton(
         tuple(_in_frame(outward, line) for line in lines),
         _in_frame(outward, base[_around(base)]),
-        _in_frame(outward, ends[_around(ends) if order is None else order]),
+        _in_frame(outward, ends[_around((ends - platform[:3, 3]) @ platform[:3, :3])]),
     )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray
 from pkmcal.core.library import POSE
+from pkmcal.geometry.chains import Chains
 from pkmcal.geometry.limb_kinds import KINDS, LimbKind
 from pkmcal.kinematics.robot import Robot
 from pkmcal.kinematics.stiffness import stiffness
@@ -28,26 +29,34 @@ def of_robot(robot: Robot) -> str:
     >>> of_robot(pk.load("hexapod"))[:62]
     'A platform on six legs of variable length (UPS). Six actuators'
     """
-    chains = robot.model.chains
-    if chains is None:
-        kinds = [(_some(KINDS[kind], n), kind) for kind, n in _counted(robot)]
-    else:
-        own = [limb[: len(limb) - chains.tail] for limb in chains.limbs]
-        letters = ["".join(_letter(j.kind, j.actuator) for j in limb) for limb in own]
-        kinds = [(f"{_count(n)} chain{'s' * (n > 1)} of joints", kind)
-                 for kind, n in Counter(letters).items()]  # fmt: skip
-    limbs = " and ".join(f"{some} ({kind})" for some, kind in kinds)
+    limbs, moved = (
+        (_listed([(_some(KINDS[kind], n), kind) for kind, n in _counted(robot)]), "it")
+        if robot.model.chains is None
+        else _of_chains(robot.model.chains)
+    )
+    n = robot.n_actuators
+    ways = _ways(robot.moved, moved)
+    return f"A platform on {limbs}. {_count(n).capitalize()} actuators {ways}."
+
+
+def _of_chains(chains: Chains) -> tuple[str, str]:
+    """Return the limbs that are chains, and what is moved by these and a tail."""
+    own = [limb[: len(limb) - chains.tail] for limb in chains.limbs]
+    letters = ["".join(_letter(j.kind, j.actuator) for j in limb) for limb in own]
+    counted = Counter(letters).items()
+    limbs = _listed([(f"{_count(n)} chain{'s' * (n > 1)} of joints", kind) for kind, n in counted])
     moved = "it"
-    if chains is not None and chains.tail:
+    if chains.tail:
         last = "".join(_letter(j.kind, j.actuator) for j in chains.limbs[0][-chains.tail :])
         joints = "joint carries" if chains.tail == 1 else "joints carry"
         limbs += f"; behind it {_count(chains.tail)} more {joints} the tool ({last})"
         moved = "the tool"
-    if chains is not None:
-        limbs += ", underlined the joints that are driven"
-    n = robot.n_actuators
-    ways = _ways(robot.moved, moved)
-    return f"A platform on {limbs}. {_count(n).capitalize()} actuators {ways}."
+    return f"{limbs}, underlined the joints that are driven", moved
+
+
+def _listed(kinds: Sequence[tuple[str, str]]) -> str:
+    """Return how many limbs of which kinds."""
+    return " and ".join(f"{some} ({kind})" for some, kind in kinds)
 
 
 def of_yielding(robot: Robot) -> str:

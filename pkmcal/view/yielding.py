@@ -11,7 +11,7 @@ from pkmcal.kinematics.robot import Robot
 from pkmcal.kinematics.stiffness import stiffness
 
 _DIGITS = 3
-_WAYS = {"along x": (1.0, 0.0, 0.0), "along y": (0.0, 1.0, 0.0), "along z": (0.0, 0.0, 1.0)}
+WAYS = {"along x": (1.0, 0.0, 0.0), "along y": (0.0, 1.0, 0.0), "along z": (0.0, 0.0, 1.0)}
 
 
 def data(robot: Robot, poses: FloatArray) -> dict[str, Any]:
@@ -21,7 +21,7 @@ def data(robot: Robot, poses: FloatArray) -> dict[str, Any]:
     median of the poses. `cloud`: along the softest direction at each pose, None where it gives way.
     """
     found = stiffness(robot, np.vstack([robot.home, poses]))
-    along = {name: found.stiffness_along(way) for name, way in _WAYS.items()}
+    along = {name: found.stiffness_along(way) for name, way in WAYS.items()}
     along["softest"] = found.softest[1]
     rows = []
     for name, values in along.items():

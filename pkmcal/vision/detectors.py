@@ -48,7 +48,7 @@ Finder = Callable[[Any], Seen]
 
 
 def opencv() -> Any:
-    """OpenCV.
+    """Import OpenCV, or say how it is installed.
 
     Raises
     ------

@@ -74,7 +74,9 @@ def test_common_errors_weigh_as_their_covariance_does():
     covariance = np.linalg.inv(design.T @ weight @ design)
     theta = found.fit.end.theta
     # the readings of a linear machine with the numbers where they were
-    off = m.values.ravel() - np.concatenate([each.ravel() for each in found.fit.end.predicted])
+    off = m.values.ravel() - np.concatenate(
+        [each.ravel() for each in found.fit.equations.prediction.values(found.fit.end)]
+    )
     off += jacobian[:, gains] @ (theta - chosen.start)[gains]
     values = theta[free] + covariance @ design.T @ weight @ off
     np.testing.assert_allclose(theta[free], values, rtol=0, atol=2e-5)

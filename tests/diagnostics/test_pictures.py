@@ -227,6 +227,40 @@ def test_what_alone_tells_the_size_of_a_machine_is_named(
     assert levels.get("scale") == level
 
 
+@pytest.mark.parametrize("printed", [1.0, 0.97, 1.04])
+def test_a_board_printed_larger_or_smaller_is_named_where_it_alone_tells_the_size(
+    printed: float,
+) -> None:
+    """A machine that has become larger as a whole, and in no part else, was not made so."""
+    random, drawn = np.random.default_rng(2), pk.load("6-rus")
+    names = drawn.geometry.match(["base*", "platform*", "crank*", "rod*"])
+    names = [
+        name for name in names if drawn.geometry.units[drawn.geometry.names.index(name)] == "mm"
+    ]
+    true = drawn.replace({n: drawn.geometry[n] + random.normal(0.0, 0.1) for n in names})
+    height = float(drawn.home[2])
+    board = Board.chessboard(4, 3, 30)
+    camera = Camera(
+        fx=1500.0, fy=1500.0, stands=[0, 0, height + 900, np.pi, 0, 0],
+        carried=[0, 0, 0, np.pi, 0, 0],
+    )  # fmt: skip
+    at, seeing = camera.seeing(drawn.inverse(pk.sample_poses(drawn, 25, seed=0, share=0.5)), board)
+    seen = pk.VirtualMachine(true, 0.02).measure(at, seeing)
+    stated = replace(seen.instrument, corner=np.asarray(seen.instrument.corner) / printed)
+    measured = replace(seen, instrument=stated, actuator_sigma=0.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", pk.CalibrationWarning)
+        found = pk.identify(drawn, measured, names)
+    (said,) = (each for each in found.verdict.said if each.check == "scale")
+    if printed == 1.0:
+        assert said.level == "remark" and abs(said.finding.grown) < 2e-3
+    else:
+        assert said.level == "doubt" and found.verdict.state == "doubtful"
+        assert said.finding.grown == pytest.approx(1.0 / printed - 1.0, abs=2e-3)
+        words = ("smaller", "larger") if printed < 1 else ("larger", "smaller")
+        assert f"the board is rather {100 * abs(1 / printed - 1):.2g} % {words[0]}" in said.text
+
+
 def test_pictures_of_corners_in_a_line_place_nothing(sound: pk.Measurements) -> None:
     """Six corners in a row tell no turning of the board; all rows are fitted all the same."""
     row = np.arange(len(sound)) % len(BOARD.ids)

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal.diagnostics.sides import CHANCE, sides
+from pkmcal.diagnostics.check import RARE
+from pkmcal.diagnostics.sides import sides
 from pkmcal.statistics.distributions import f_tail
 from pkmcal.statistics.group_test import group_test
 
@@ -44,7 +45,7 @@ def test_a_joint_that_hangs_where_it_is_pushed_is_seen() -> None:
     for each in found:
         seen = sides(each)
         assert seen is not None
-        assert seen.chance < CHANCE
+        assert seen.chance < RARE
         assert seen.where == "that lean to the two sides about x"
         assert each.verdict.state == "doubtful"
 
@@ -52,7 +53,7 @@ def test_a_joint_that_hangs_where_it_is_pushed_is_seen() -> None:
 @pytest.mark.parametrize("seed", range(6))
 def test_a_sound_machine_has_no_sides(seed: int) -> None:
     seen = sides(identified(seed, 0.0))
-    assert seen is None or seen.chance >= CHANCE
+    assert seen is None or seen.chance >= RARE
 
 
 def test_how_far_apart_they_are_is_that_of_two_fits() -> None:

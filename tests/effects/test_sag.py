@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal.arms.inputs import ERRORS
 from pkmcal.arms.joint_laws import JointLaws, Term
 from pkmcal.arms.joint_pulls import JointPulls
 from pkmcal.arms.weights import at_rest, gravity_torques
@@ -23,6 +22,7 @@ from pkmcal.calibration.rigid import rigid_arm
 from pkmcal.diagnostics.sag import sag_that_helps
 from pkmcal.diagnostics.waves import _alike, scan_waves
 from pkmcal.fitted.left_out import compared_by_poses
+from pkmcal.geometry.chain_joints import ERRORS
 from pkmcal.kinematics.arm_machine import ArmMachine
 from pkmcal.kinematics.calibratable import as_machine
 

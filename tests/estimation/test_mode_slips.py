@@ -117,6 +117,7 @@ def test_how_far_off_a_pose_is_counts_angles_as_their_arc(hexapod: pk.Robot) -> 
         [0, 2, 0, 0.1, 0, 0], [0, 0, 0, 0, 0, 0],
     ])  # fmt: skip
     pose[order[3]] = np.nan
-    off = worst_readings(fit.equations, fit.equations.prediction.at(pose, fit.start.theta))[order]
+    residuals = fit.equations.prediction.seen(pose, fit.start.theta)[1]
+    off = worst_readings(fit.equations, residuals)[order]
     arc = 1e-3 * hexapod.length
     np.testing.assert_allclose(off, [arc, 5.0, 7.0, np.inf, 2.0, 0.0], atol=1e-6)

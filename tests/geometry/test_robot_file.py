@@ -19,7 +19,8 @@ from pkmcal.files.toml_lines import Source
 from pkmcal.geometry import robot_file
 from pkmcal.geometry.chain_joints import Joint
 from pkmcal.geometry.chains import Chains
-from pkmcal.geometry.model import Cone, Limb, Model
+from pkmcal.geometry.limbs import Cone, Limb
+from pkmcal.geometry.model import Model
 
 from ..workspaces import CHAINS
 
@@ -84,7 +85,7 @@ def bits(value: object) -> object:
 
 
 def all_bits(model: Model) -> dict[str, object]:
-    found = {name: bits(value) for name, value in vars(model).items()}
+    found = {each.name: bits(getattr(model, each.name)) for each in fields(model)}
     geometry = model.geometry
     found["geometry"] = bits([geometry.names, geometry.units, geometry.numbers, geometry.values])
     found["file"] = None

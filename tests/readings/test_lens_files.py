@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
 import pkmcal as pk
@@ -19,7 +21,7 @@ BLOCK = (
 )
 
 
-def read(tmp_path: Path, text: str) -> dict[str, float]:
+def read(tmp_path: Path, text: str) -> dict[str, Any]:
     file = tmp_path / "lens.yaml"
     file.write_text(text)
     return read_lens(file)
@@ -70,4 +72,67 @@ def test_what_would_be_another_lens_is_refused(tmp_path: Path, text: str, messag
     own = "" if "camera_matrix" in text else f"K: {MATRIX}\n"
     with pytest.raises(pk.exceptions.FileError, match=message) as raised:
         read(tmp_path, f"{own}{text}\n")
+    assert "lens.yaml" in str(raised.value)
+
+
+INFO = (
+    f"height: 960\nwidth: 1280\ndistortion_model: plumb_bob\nD: [0.1, -0.2, 0.001, 0.002, 0.03]\n"
+    f"K: {MATRIX}\nR: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]\n"
+)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "binning_x: 2\nbinning_y: 3\nroi:\n  x_offset: 100\n  y_offset: 60\n  height: 600\n"
+        "  width: 800\n  do_rectify: False\n",
+        "binning_x: 2\nbinning_y: 3\n"
+        "roi: {x_offset: 100, y_offset: 60, height: 600, width: 800, do_rectify: false}\n",
+    ],
+)
+def test_the_lens_of_a_part_of_the_sensor_sees_what_the_whole_one_sees(
+    tmp_path: Path, text: str
+) -> None:
+    """A point is seen by pixels put together where the mean of those of the whole sensor is."""
+    whole, part = read(tmp_path, INFO), read(tmp_path, INFO + text)
+    assert (part["width"], part["height"]) == (400, 200)
+    for x, y in ((0.0, 0.0), (0.1, -0.07)):
+        for focal, middle, at, first, together in (
+            ("fx", "cx", x, 100, 2),
+            ("fy", "cy", y, 60, 3),
+        ):
+            pixels = part[focal] * at + part[middle]  # of a point without distortion
+            of_whole = first + np.mean(pixels * together + np.arange(together))
+            assert whole[focal] * at + whole[middle] == pytest.approx(of_whole, abs=1e-9)
+    assert all(part[name] == whole[name] for name in ("k1", "k2", "p1", "p2", "k3"))
+
+
+@pytest.mark.parametrize("text", ["binning_x: 0\nbinning_y: 0\n", "roi:\n  x_offset: 0\n"])
+def test_binning_and_region_of_zero_are_none(tmp_path: Path, text: str) -> None:
+    assert read(tmp_path, INFO + text) == LENS | {"width": 1280, "height": 960}
+
+
+def test_the_uncertainty_of_a_lens_is_that_of_its_pictures(tmp_path: Path) -> None:
+    stated = "stdDeviationsIntrinsics: [4.0, 4.0, 2.0, 2.0, 0.01, 0.02, 0.001, 0.001, 0.01]\n"
+    whole = np.asarray(read(tmp_path, INFO + stated)["lens_sigma"])
+    part = np.asarray(read(tmp_path, INFO + stated + "binning_x: 2\n")["lens_sigma"])
+    assert np.diag(part)[[0, 2]] == pytest.approx(np.diag(whole)[[0, 2]] / 4.0)
+    assert np.delete(np.diag(part), [0, 2]) == pytest.approx(np.delete(np.diag(whole), [0, 2]))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("binning_x: 1.5", "binning_x: expected a whole number from 0 on; found 1.5"),
+        ("binning_y: -2", "binning_y: expected a whole number from 0 on; found -2"),
+        ("roi: 5", "roi: expected x_offset"),
+        ("roi: {x_offset: much}", "roi: "),
+        ("roi:\n  x_offset: 900\n  width: 800", "roi: pixels 900 to 1700 are not within width"),
+    ],
+)
+def test_a_part_of_the_sensor_that_cannot_be_is_refused(
+    tmp_path: Path, text: str, message: str
+) -> None:
+    with pytest.raises(pk.exceptions.FileError, match=message) as raised:
+        read(tmp_path, f"{INFO}{text}\n")
     assert "lens.yaml" in str(raised.value)

@@ -53,6 +53,39 @@ def test_no_picture_is_at_its_mirrored_place(size: float, noise: float) -> None:
         np.testing.assert_array_equal(taken, possible[np.arange(len(true)), nearer])
 
 
+@pytest.mark.parametrize("flat", [True, False])
+def test_corners_of_which_three_are_in_a_line_place_a_board(flat: bool) -> None:
+    """Four of them leave the projection of a plane open; its place they tell all the same."""
+    random = np.random.default_rng(0)
+    board = np.array([[0, 0, 0], [60, 0, 0], [120, 0, 0], [30, 90, 0.0]])
+    if not flat:
+        board = np.vstack([board, [[80, 60, 40], [20, 30, 70.0]]])
+    count = 30
+    pose = np.hstack([random.uniform(-80, 80, (count, 2)), random.uniform(600, 900, (count, 1)),
+                      random.uniform(-0.6, 0.6, (count, 3))])  # fmt: skip
+    picture = np.repeat(np.arange(count), len(board))
+    corner = np.tile(board, (count, 1))
+    pixel = instruments.pixels(pose[picture], corner, LENS, np.zeros(1))[0]
+    found = board_poses(corner, pixel, LENS, picture)
+    off = np.linalg.norm(found.pose[:, :, :3] - pose[:, None, :3], axis=2)
+    assert np.nanmin(off, axis=1).max() < 1e-5
+    assert np.nanmin(found.rms, axis=1).max() < 1e-6
+
+
+def test_places_do_not_hang_on_the_order_of_rows() -> None:
+    board, random = Board.chessboard(6, 5, 30), np.random.default_rng(1)
+    pose = np.array(
+        [[10, -20, 700, 0.3, 0.2, 0.1], [-30, 5, 900, -0.2, 0.4, -0.5], [0, 0, 800, 0.5, 0, 1.0]]
+    )
+    picture = np.repeat(np.arange(3), len(board.ids))
+    corner = np.tile(board.places, (3, 1))
+    pixel = instruments.pixels(pose[picture], corner, LENS, np.zeros(1))[0]
+    order = random.permutation(len(picture))
+    for way in (np.arange(len(picture)), order):
+        found = board_poses(corner[way], pixel[way], LENS, picture[way])
+        np.testing.assert_allclose(found.pose[:, 0], pose, atol=1e-6)
+
+
 def test_a_pixel_is_the_distance_over_the_focal_length_where_boards_are_across() -> None:
     board = Board.chessboard(5, 4, 10)
     straight = np.array([1000.0, 1000, 500, 400, 0, 0, 0, 0, 0])

@@ -1,6 +1,6 @@
 // The window: five screens over one project that the server keeps, and files that are given to it.
 import * as server from './transport.js'
-import { STEPS, app, attempt, change, frame, go, made, refresh, said, trouble, work } from './frame.js'
+import { $, STEPS, app, attempt, frame, go, made, refresh, said, trouble, work } from './frame.js'
 
 // each screen is fetched when it is first shown
 for (const { dataset: { step } } of STEPS) app.screens[step] = async main => (await import(`./${step}.js`))[step](main)
@@ -22,18 +22,67 @@ addEventListener('drop', event => {
 attempt(async () => {
   app.project = await server.state()
   frame()
-  if (app.project.trouble) trouble(app.project.trouble)
+  $('undo').onclick = () => attempt(async () => {
+    said([])
+    if (await settled(inTurn(() => taken(server.undo(app.project.version))))) await refresh()
+  })
   const first = stepOf(location.hash) ?? (app.project.commands.result.length ? 'result' : 'machine')
   history.replaceState(null, '', `#${first}`)
+  const told = attempt(follow) // also while the first screen is begun
   await go(first, false)
+  if (app.project.trouble) trouble(app.project.trouble)
   document.body.dataset.ready = ''
-  for await (const message of server.changes()) {
-    if (message.changed === app.project.version) continue
-    app.project = await server.state()
-    await refresh()
+  await told
+})
+
+// Show what other tabs change.
+async function follow() {
+  for await (const version of server.changes()) {
+    if (version <= app.project.version) continue
+    newest(await server.state())
+    refresh()
   }
   throw Error(server.ENDED)
-})
+}
+
+// Answers may come late: none takes the place of a newer one.
+function newest(answer) {
+  if (answer.version >= app.project.version) app.project = answer
+}
+
+let last = Promise.resolve()
+
+function inTurn(what) {
+  const done = last.then(what)
+  last = done.catch(() => {})
+  return done
+}
+
+// Change the project by a function of a copy of its table, one change after the other, each of what
+// the one before has left; false if another tab was first.
+export function change(edit) {
+  return settled(inTurn(async () => {
+    const { state, version } = app.project, table = structuredClone(state)
+    await edit(table)
+    for (const [name, part] of Object.entries(table)) if (part && typeof part === 'object' && !Object.keys(part).length) delete table[name]
+    return taken(server.change(table, version))
+  }))
+}
+
+async function taken(asked) {
+  const answer = await asked.catch(failed => ({ failed }))
+  if (!answer.failed) newest(answer)
+  return answer
+}
+
+async function settled(changed) {
+  const { failed, late } = await changed
+  if (failed || late) await refresh() // what was ticked or typed is not so
+  else frame()
+  if (failed) throw failed
+  if (late) trouble('Another tab changed the project. This one now shows it as it is: do it again if you still want to.')
+  return !late
+}
 
 // Take files into the project, whatever they are and wherever they were dropped.
 export const take = files => attempt(async () => {
@@ -48,9 +97,15 @@ export const take = files => attempt(async () => {
 })
 
 export async function given(what, kept = []) {
-  const found = await work('take', 'looking at what it is', what)
-  if (!await change(table => { for (const part of Object.keys(table)) delete table[part]; Object.assign(table, found.state) })) return
-  said([...kept, ...found.said])
+  let told = []
+  const done = await change(async table => {
+    const found = await work('take', 'looking at what it is', what)
+    for (const part of Object.keys(table)) delete table[part]
+    Object.assign(table, found.state)
+    told = found.said
+  })
+  if (!done) return
+  said([...kept, ...told])
   await refresh()
 }
 

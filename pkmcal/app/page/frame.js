@@ -2,8 +2,8 @@
 import * as server from './transport.js'
 
 export const STEPS = [...document.querySelectorAll('#steps button')] // painted before anything is asked
-export const app = { step: 'machine', project: null, screens: {}, picture: null, times: {} }
-const $ = id => document.getElementById(id)
+export const app = { step: 'machine', project: null, screens: {}, show: null, picture: null }
+export const $ = id => document.getElementById(id)
 
 export function made(tag, parent, settings = {}, ...children) {
   const element = document.createElement(tag)
@@ -45,8 +45,7 @@ export function tick(parent, text, checked, changed) {
 }
 
 export function trouble(text) {
-  $('trouble').hidden = !text
-  $('trouble').textContent = text ?? ''
+  Object.assign($('trouble'), { hidden: !text, textContent: text ?? '' })
 }
 
 // Whatever fails says why, and everything else stays as it was.
@@ -55,44 +54,54 @@ export async function attempt(what) {
   try {
     return await what()
   } catch (error) {
-    if (!error.stopped) trouble(error.message)
-    return undefined
+    if (!error.left) trouble(error.stopped ? STOPPED : error.message)
   }
 }
+
+const STOPPED = 'Stopped: what stands here is as it was before. Press the step again to go on.'
+const running = new Set() // works under way; the bar is of the last of them
 
 // Work that may take long: words and a bar after a quarter of a second, and a button that ends it.
-// Of one operation only what was asked last goes on.
-export async function work(operation, words, given) {
-  const bar = $('busy'), began = performance.now(), own = {}
-  if (running[operation]?.job) server.cancel(running[operation].job)
-  running[operation] = own
-  bar.firstElementChild.textContent = words
-  bar.querySelector('progress').removeAttribute('value')
-  const shown = setTimeout(() => { bar.hidden = false }, 250)
-  bar.querySelector('button').onclick = () => own.job && server.cancel(own.job)
+export async function work(operation, words, given, own = {}) {
+  const request = new AbortController()
+  const end = how => {
+    own.ended ??= Object.assign(Error('stopped'), how)
+    if (own.job) server.cancel(own.job)
+    request.abort()
+  }
+  Object.assign(own, { words, end })
+  running.add(own)
+  const shown = setTimeout(() => { own.long = true; busy() }, 250)
   try {
-    for await (const message of await server.run(operation, given)) {
+    for await (const message of await server.run(operation, given, request.signal)) {
+      if (own.ended) break
       own.job ??= message.job
-      if (own.job && running[operation] !== own) server.cancel(own.job)
-      if (message.progress) bar.firstElementChild.textContent = `${words}: ${message.progress}`
-      if (typeof message.share === 'number') bar.querySelector('progress').value = message.share
+      if (message.progress) Object.assign(own, { words: `${words}: ${message.progress}`, share: message.share })
+      busy()
       if (message.error) throw Object.assign(Error(message.error.message), message.error)
-      if (message.result) {
-        app.times[operation] = performance.now() - began
-        return message.result
-      }
+      if (message.result) return message.result
     }
     throw Error('the server ended')
+  } catch (error) {
+    throw own.ended ?? error
   } finally {
     clearTimeout(shown)
-    if (running[operation] === own) {
-      delete running[operation]
-      bar.hidden = !Object.keys(running).length
-    }
+    running.delete(own)
+    busy()
   }
 }
 
-const running = {}
+function busy() {
+  const bar = $('busy'), own = [...running].filter(one => one.long).pop()
+  bar.hidden = !own
+  if (!own) return
+  const [text, progress, stop] = bar.children
+  text.textContent = own.words
+  if (typeof own.share === 'number') progress.value = own.share
+  else progress.removeAttribute('value')
+  stop.onclick = () => running.forEach(one => one.end({ stopped: true })) // they wait for each other
+}
+
 const keyOf = one => `${one.tagName} ${one.id || one.dataset.key || one.getAttribute('aria-label') || one.textContent}`
 
 // Draw again what stands in an element: who is in one of its fields or has scrolled stays there.
@@ -111,33 +120,6 @@ export function again(parent, draw) {
   now.focus({ preventScroll: true })
 }
 
-let last = Promise.resolve()
-
-// Change the project by a function of a copy of its table, one change after the other; false if
-// another tab was first.
-export function change(edit) {
-  const changed = last.then(() => changing(edit))
-  last = changed.catch(() => {})
-  return changed
-}
-
-async function changing(edit) {
-  const table = structuredClone(app.project.state)
-  edit(table)
-  for (const [name, part] of Object.entries(table)) if (part && typeof part === 'object' && !Object.keys(part).length) delete table[name]
-  const back = async error => { await refresh(); throw error } // what was ticked or typed is not so
-  return taken(await server.change(table, app.project.version).catch(back))
-}
-
-async function taken(answer) {
-  app.project = answer
-  frame()
-  if (!answer.late) return true
-  await refresh()
-  trouble('Another tab changed the project. This one now shows it as it is: do it again if you still want to.')
-  return false
-}
-
 const ready = {
   machine: () => true, plan: p => p.commands.plan.length, measure: p => p.commands.machine.length,
   result: p => p.commands.result.length, out: p => p.commands.result.length,
@@ -154,42 +136,59 @@ export function frame() {
     one.disabled = !ready[step](project)
   }
   $('undo').hidden = !project.undo
-  $('undo').onclick = () => attempt(async () => {
-    said([])
-    if (await taken(await server.undo(app.project.version))) await refresh()
-  })
   const lines = project.commands[app.step] ?? []
   $('terminal').hidden = !lines.length
   $('terminal').querySelector('pre').textContent = [project.enter, ...lines].join('\n')
   $('terminal').querySelector('button').onclick = () => attempt(() => navigator.clipboard.writeText($('terminal').querySelector('pre').textContent))
 }
 
+let turn = 0, shown = Promise.resolve(), asked = null, building = null
+
 // Show a screen; the browser's way back leads to the one before, and a reload shows it again.
 export async function go(step, focus = true, keep = false) {
   if (!ready[step](app.project)) step = 'machine' // as after undo
   if (step !== app.step) said([])
   if (!keep && `#${step}` !== location.hash) history.pushState(null, '', `#${step}`)
-  app.step = step
-  app.refresh = null
+  leave()
+  Object.assign(app, { step, show: null })
   app.picture?.machine?.dispose?.()
   app.picture = null
   frame()
-  const main = $('main')
-  const screen = made('div', null) // what a screen before still adds is not seen
+  const main = $('main'), screen = made('div', null)
   main.replaceChildren(screen)
   main.className = step
   if (focus) main.focus({ preventScroll: true })
-  await attempt(async () => {
-    const show = await app.screens[step](screen)
-    if (app.step === step && screen.isConnected) app.refresh = show
-  })
+  const mine = building = attempt(async () => {
+    const show = await app.screens[step](screen) // what stands there whatever the project is
+    if (screen.isConnected) await showing(app.show = show)
+  }).finally(() => { if (building === mine) building = null })
+  await mine
 }
 
 // Show the project as it is now; the screen stays, unless it has nothing to do any more.
 export async function refresh() {
   frame()
-  if (app.refresh && ready[app.step](app.project)) await attempt(app.refresh)
+  if (!ready[app.step](app.project)) await go('machine', false)
+  else if (app.show) await showing()
+  else if (building) await building // it shows what is there by then
   else await go(app.step, false)
+}
+
+// A screen is drawn once at a time, and last of what was asked last: what is under way is left.
+function showing(show = app.show) {
+  const mine = leave()
+  shown = shown.then(async () => {
+    if (mine !== turn) return
+    const ask = (operation, words, given) => work(operation, words, given, asked = {})
+    const done = await attempt(() => show(ask).then(() => true))
+    if (mine === turn) $('main').toggleAttribute('data-before', !done) // what stands there is older
+  })
+  return shown
+}
+
+function leave() {
+  if (running.has(asked)) asked.end({ left: true })
+  return ++turn
 }
 
 // What is said of files that were given.

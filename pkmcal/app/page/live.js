@@ -1,5 +1,6 @@
 // A measurement with a machine: connected, started and stopped by who looks at it, a row after the other.
-import { app, attempt, button, change, choice, field, go, made, refresh, work } from './frame.js'
+import { change } from './app.js'
+import { app, attempt, button, choice, field, go, made, refresh, work } from './frame.js'
 import * as server from './transport.js'
 
 const KINDS = [['height', 'heights'], ['position', 'positions'], ['pose', 'poses'], ['distance', 'distances'], ['closure', 'nothing but its actuators']]

@@ -1,6 +1,6 @@
 // Which machine: a file that is dropped, or one that is built in.
-import { dropping, given } from './app.js'
-import { again, app, button, change, choice, go, made, refresh, work } from './frame.js'
+import { change, dropping, given } from './app.js'
+import { again, app, button, choice, go, made, refresh } from './frame.js'
 
 export async function machine(main) {
   made('h1', main, { text: 'Which machine?' })
@@ -13,13 +13,13 @@ export async function machine(main) {
   const built = made('div', side, { className: 'choices' })
   for (const name of app.project.machines) button(built, name, () => given({ builtin: name }))
 
-  const show = async () => {
+  const show = async ask => {
     if (!app.project.commands.machine.length) {
       about.replaceChildren()
       picture.replaceChildren()
       return
     }
-    const found = await work('machine', 'reading the machine')
+    const found = await ask('machine', 'reading the machine')
     again(about, () => describe(about, found))
     again(others, () => {
       if (found.machines.length) made('h2', others, { text: 'or of a file of this project' })
@@ -29,7 +29,6 @@ export async function machine(main) {
     if (found.view) await (await import('./picture.js')).draw(picture, found.view)
     else picture.replaceChildren()
   }
-  await show()
   return show
 }
 

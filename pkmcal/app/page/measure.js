@@ -1,7 +1,7 @@
 // What was measured: files as they lie there, and as they are understood.
-import { dropping } from './app.js'
+import { change, dropping } from './app.js'
 import { live } from './live.js'
-import { again, app, button, change, choice, field, go, made, refresh, tick, work } from './frame.js'
+import { again, app, button, choice, field, go, made, refresh, tick } from './frame.js'
 
 export async function measure(main) {
   made('h1', main, { text: 'What was measured' })
@@ -12,7 +12,7 @@ export async function measure(main) {
   const list = made('ul', side, { className: 'files' }), asked = made('div', side), joins = made('div', side), next = made('div', side)
   let heads = null
 
-  const show = async () => {
+  const show = async ask => {
     const { measured = {} } = app.project.state, files = measured.files ?? []
     again(list, () => listed(list, measured))
     again(asked, () => { if (files.length) how(asked) })
@@ -21,7 +21,7 @@ export async function measure(main) {
       heads = null
       return
     }
-    const found = await work('look', 'reading the files')
+    const found = await ask('look', 'reading the files')
     const these = found.columns.map(({ file, heading }) => `${file} ${heading}`).sort().join('\n')
     if (heads?.of !== these) { // else they stay as they are, with whoever is in one of them
       understood.replaceChildren()
@@ -46,8 +46,7 @@ export async function measure(main) {
       }
     })
   }
-  await show()
-  await live(made('section', main))
+  live(made('section', main))
   return show
 }
 
@@ -55,15 +54,17 @@ const edit = async what => {
   if (await change(table => { table.measured ??= {}; what(table.measured, table) })) await refresh()
 }
 
+const without = (measured, file) => { measured.files = (measured.files ?? []).filter(one => one !== file) }
+
 function listed(list, { files = [], controller = '' }) {
   for (const file of files) {
     const item = made('li', list, {}, made('span', null, { text: file }))
-    button(item, 'is the controller’s log', () => edit(m => { m.files = files.filter(f => f !== file); m.controller = file }), { 'data-key': `log ${file}` })
-    button(item, `remove ${file}`, () => edit(m => { m.files = files.filter(f => f !== file) }))
+    button(item, 'is the controller’s log', () => edit(m => { without(m, file); m.controller = file }), { 'data-key': `log ${file}` })
+    button(item, `remove ${file}`, () => edit(m => without(m, file)))
   }
   if (!controller) return
   const item = made('li', list, {}, made('span', null, { text: `${controller}: the controller’s log` }))
-  button(item, 'is measurements', () => edit(m => { m.files = [...files, controller]; delete m.controller }), { 'data-key': `log ${controller}` })
+  button(item, 'is measurements', () => edit(m => { m.files = [...m.files ?? [], controller]; delete m.controller }), { 'data-key': `log ${controller}` })
   button(item, `remove ${controller}`, () => edit(m => { delete m.controller }))
 }
 

@@ -1,5 +1,6 @@
 // What is taken away: the changed configuration, the calibrated machine, the report.
-import { again, app, attempt, button, change, choice, field, frame, made, refresh, said, work } from './frame.js'
+import { change } from './app.js'
+import { again, app, attempt, button, choice, field, frame, made, refresh, said, work } from './frame.js'
 import { save } from './transport.js'
 
 export async function out(main) {
@@ -23,22 +24,25 @@ export async function out(main) {
     }
   }
 
-  const show = async () => {
-    const found = await work('out', 'writing')
+  const show = async ask => {
+    const found = await ask('out', 'writing')
     app.project.commands.out = found.commands
     frame()
     again(lines, () => changes(lines, found.changed))
-    const targets = app.project.state.export?.as ?? []
-    const set = async now => { await change(table => { if (now.length) table.export = { as: now }; else delete table.export }) && await refresh() }
+    const set = async edit => {
+      await change(table => {
+        const targets = edit(table.export?.as ?? [])
+        table.export = targets.length ? { as: targets } : {}
+      }) && await refresh()
+    }
     said(found.said)
     again(list, () => found.files.forEach(one => {
       const item = offer(list, one)
-      if (one.target) button(item, `remove ${one.target}`, () => set(targets.filter(name => name !== one.target)))
+      if (one.target) button(item, `remove ${one.target}`, () => set(now => now.filter(name => name !== one.target)))
     }))
-    again(more, () => choice(more, 'for another controller', [['', '…'], ...found.targets], '', target => target && set([...targets, target])))
+    again(more, () => choice(more, 'for another controller', [['', '…'], ...found.targets], '', target => target && set(now => [...now, target])))
     if (!fields) certificate(found.certificate)
   }
-  await show()
   return show
 }
 

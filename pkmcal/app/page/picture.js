@@ -6,10 +6,11 @@ const cores = {}
 
 // Draw a machine; where it was drawn before, the look at it and what is shown stay.
 export async function draw(parent, data, picked) {
-  const old = app.picture?.isConnected && app.picture.parentElement === parent ? app.picture : null
   const { start } = await import('/view.js')
-  const root = made('div', null, { className: 'pkmcal-view' })
   cores[data.kind] ??= await core(data.kind)
+  if (!parent.isConnected) return // another screen is shown by now
+  const last = app.picture, old = last?.isConnected && last.parentElement === parent ? last : null
+  const root = made('div', null, { className: 'pkmcal-view' })
   if (old) old.replaceWith(root)
   else parent.replaceChildren(root)
   app.picture = root
@@ -36,7 +37,8 @@ export async function draw(parent, data, picked) {
     const { turn, tilt, zoom, room, centre, radius, floor, points, fitted, tilted } = old.machine.scene
     Object.assign(scene, { turn, tilt, zoom, room, centre, radius, floor, points, fitted, tilted })
   }
-  old?.machine?.dispose()
+  last?.machine?.dispose?.()
+  if (!root.isConnected) return root.machine.dispose()
   root.machine.changed(false)
   const pointed = scene.pointed
   if (pointed) {
@@ -45,7 +47,6 @@ export async function draw(parent, data, picked) {
       if (pressed && calibration.named) picked?.(calibration.named.key)
     }
   }
-  return root
 }
 
 // Name the residual of a row in the picture, as if it were pointed at.

@@ -1,5 +1,6 @@
 // Where to measure, so that a calibration knows best where the machine goes.
-import { again, app, attempt, button, change, choice, field, made, work } from './frame.js'
+import { change } from './app.js'
+import { again, app, attempt, button, choice, field, made, refresh } from './frame.js'
 import { draw } from './picture.js'
 import { save } from './transport.js'
 
@@ -50,17 +51,17 @@ export async function plan(main) {
     else for (const key of ['gcode', 'dwell', 'safe-height']) delete asked[key]
     if (asked.count === undefined && asked.accuracy === undefined) asked.count = 20
     if (asked.accuracy !== undefined && asked.count !== undefined) delete asked[document.activeElement === fields[0][1] ? 'accuracy' : 'count']
-    if (await change(table => { table.plan = asked })) await show()
+    if (await change(table => { table.plan = asked })) await refresh()
   }
 
-  const show = async () => {
+  const show = async ask => {
     fill()
     if (gcode !== document.activeElement) gcode.value = now().gcode ?? ''
     programmed()
     if (!Object.keys(now()).length) return
     answer.inert = true // what stands there is of other fields
-    const found = await work('plan', 'choosing poses').catch(error => {
-      if (!error.stopped) answer.replaceChildren()
+    const found = await ask('plan', 'choosing poses').catch(error => {
+      if (!error.stopped && !error.left) answer.replaceChildren()
       throw error
     })
     answer.inert = false
@@ -78,7 +79,6 @@ export async function plan(main) {
     })
     await draw(made('div', split, { className: 'picture' }), found.view)
   }
-  await show()
   return show
 }
 

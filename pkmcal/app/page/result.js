@@ -1,5 +1,6 @@
 // How good it is: the verdict first, then rows, numbers and the picture, each of which refits.
-import { again, app, attempt, button, change, choice, made, work } from './frame.js'
+import { change } from './app.js'
+import { again, app, attempt, button, choice, made, refresh } from './frame.js'
 import { grid } from './grid.js'
 import { numbers } from './numbers.js'
 import { draw, selected } from './picture.js'
@@ -26,8 +27,7 @@ export async function result(main) {
   const list = { order: [], named: null, all: false }
 
   const refit = async edit => {
-    if (edit && !await change(table => { table.fit ??= {}; edit(table.fit) })) return
-    await show()
+    if (await change(table => { table.fit ??= {}; edit(table.fit) })) await refresh()
   }
   // one row, from the list or from the picture: named in both, and with its box
   const name = (key, from) => {
@@ -43,9 +43,8 @@ export async function result(main) {
     })
   }
 
-  const show = async () => {
-    const found = await work('fit', 'calibrating')
-    if (!main.isConnected) return // another screen, or this one begun anew, is shown by now
+  const show = async ask => {
+    const found = await ask('fit', 'calibrating')
     for (const row of found.rows) Object.assign(row, { use: row.use ?? '', said: row.said ?? '', drop: row.drop === undefined ? row.key : row.drop })
     app.found = found
     again(verdict, () => say(verdict, found, refit))
@@ -56,11 +55,9 @@ export async function result(main) {
     for (const each of found.numbers) before[each.name] = each.stderr
     if (found.view) await draw(picture, found.view, key => name(key, 'picture'))
     if (list.named) name(list.named, 'list')
-    const counter = document.getElementById('main').dataset
-    counter.fits = +counter.fits + 1
+    if (main.isConnected) main.parentElement.dataset.fits = +main.parentElement.dataset.fits + 1
   }
   pick(app.part ?? 'rows')
-  await show()
   return show
 }
 

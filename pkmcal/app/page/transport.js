@@ -17,7 +17,7 @@ async function ask(path, settings = {}) {
   return answer
 }
 
-const post = (path, data) => ask(path, { method: 'POST', body: JSON.stringify(data ?? {}) })
+const post = (path, data, signal) => ask(path, { method: 'POST', body: JSON.stringify(data ?? {}), signal })
 export const state = async () => (await ask('/api/state')).json()
 export const core = async kind => packed(await (await ask(`/wasm/${kind}`)).arrayBuffer())
 export const cancel = job => post(`/api/cancel/${job}`)
@@ -38,7 +38,7 @@ export async function send(file) {
   return answer.json() // its name here, and what there is to say
 }
 
-export const run = (operation, given) => post(`/api/run/${operation}`, given).then(lines)
+export const run = (operation, given, signal) => post(`/api/run/${operation}`, given, signal).then(lines)
 
 // A measurement with a machine: what happens, line by line, and what is said to it.
 export const measuring = asked => post('/api/live', asked).then(lines)
@@ -46,8 +46,9 @@ export const start = name => post(`/api/live/${name}/start`)
 export const typed = (name, number, text) => post(`/api/live/${name}/type`, { number, text })
 export const stop = () => post('/api/live/stop')
 
+// The versions that other tabs make, and the one that is there when this begins.
 export async function* changes() {
-  for await (const message of lines(await ask('/api/events'))) if (message.changed && message.by !== tab) yield message
+  for await (const { version, changed, by } of lines(await ask('/api/events'))) if (version || by !== tab) yield version ?? changed
 }
 
 export async function save(path) {
