@@ -83,7 +83,8 @@ test-app: $(TESTS)
 test-linuxcnc: $(TESTS)
 	command -v halcompile || { apt-get update -qq && DEBIAN_FRONTEND=noninteractive \
 		apt-get install -qq -y --no-install-recommends linuxcnc-uspace linuxcnc-uspace-dev; }
-	LINUXCNC=1 $(BIN)/pytest tests/controllers/test_linuxcnc.py tests/live/test_linuxcnc.py
+	LINUXCNC=1 $(BIN)/pytest tests/controllers/test_linuxcnc.py tests/live/test_linuxcnc.py \
+		tests/jobs/test_plan_words.py
 
 test-avx512: $(TESTS)
 	FLAGS="$$($(BIN)/python -c 'import csrc.build; print(*csrc.build.flags())')" sh tests/fuzz/avx512.sh

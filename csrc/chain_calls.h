@@ -10,7 +10,7 @@ typedef struct {
     ptrdiff_t stride;
 } chain_geometry;
 
-/* The numbers of a block: once where rows share them. */
+/* The numbers of chains for the block of rows from `first` on: once where all rows share them. */
 INLINE void chain_prepare(const chain_geometry *of, ptrdiff_t first, const ptrdiff_t *row,
                           chain_numbers *numbers)
 {
@@ -261,12 +261,10 @@ int CALL(chain_forward)(const pkm_chains *machine, ptrdiff_t n, const double *ge
     chain_start start = {0};
     chain_prediction predicted;
     int own = 0; /* is what follows of the guess each row's own? */
-    for (ptrdiff_t first = 0; first < n; first += LANES) {
-        ptrdiff_t row[LANES];
+    EACH_BLOCK(first, n, row, count) {
         real lane_q[PKM_MAX_LIMBS], drive[PKM_MAX_LIMBS], begin[6], found[6];
         chain_answer answer;
         mask valid = fill_mask(-1);
-        const int count = block_rows(first, n, row);
         chain_prepare(&of, first, row, &numbers);
         gather_row(q, machine->actuators, machine->actuators, row, lane_q);
         gather_row(guess, guess_stride, 6, row, begin);
@@ -306,10 +304,8 @@ int CALL(chain_inverse)(const pkm_chains *machine, ptrdiff_t n, const double *ge
     if (!pkm_chain_count(machine)) return PKM_BAD_MACHINE;
     const chain_geometry of = {machine, geometry, geometry_stride};
     chain_numbers numbers;
-    for (ptrdiff_t first = 0; first < n; first += LANES) {
-        ptrdiff_t row[LANES];
+    EACH_BLOCK(first, n, row, count) {
         real lane_pose[6], R[9], p[3], drive[PKM_MAX_LIMBS], theta[PKM_MAX_JOINTS];
-        const int count = block_rows(first, n, row);
         chain_prepare(&of, first, row, &numbers);
         gather_row(pose, 6, 6, row, lane_pose);
         FN(pose_frame)(lane_pose, R, p);
@@ -381,11 +377,9 @@ int CALL(chain_frames)(const pkm_chains *machine, ptrdiff_t n, const double *geo
     const chain_geometry of = {machine, geometry, geometry_stride};
     const int width = 12 * (machine->first[machine->chains] + machine->chains);
     chain_numbers numbers;
-    for (ptrdiff_t first = 0; first < n; first += LANES) {
-        ptrdiff_t row[LANES];
+    EACH_BLOCK(first, n, row, count) {
         real lane_q[PKM_MAX_LIMBS], drive[PKM_MAX_LIMBS];
         chain_state at;
-        const int count = block_rows(first, n, row);
         chain_prepare(&of, first, row, &numbers);
         mask held;
         const mask good = chain_inspect(machine, &numbers, pose, q, row, lane_q, drive, &at, &held);

@@ -14,13 +14,11 @@ int CALL(chain_closure)(const pkm_chains *machine, ptrdiff_t n, const double *ge
     if (!all) return PKM_BAD_MACHINE;
     const chain_geometry of = {machine, geometry, geometry_stride};
     chain_numbers numbers;
-    for (ptrdiff_t first = 0; first < n; first += LANES) {
-        ptrdiff_t row[LANES];
+    EACH_BLOCK(first, n, row, count) {
         real lane_q[PKM_MAX_LIMBS], drive[PKM_MAX_LIMBS], worst, flat;
         real phi[PKM_MAX_CHAIN_ROWS], jacobian[PKM_MAX_CHAIN_ROWS * MAX_CHAIN_UNKNOWNS];
         chain_view view[PKM_MAX_LIMBS];
         chain_state at;
-        const int count = block_rows(first, n, row);
         chain_prepare(&of, first, row, &numbers);
         mask held;
         const mask good = chain_inspect(machine, &numbers, pose, q, row, lane_q, drive, &at, &held);
@@ -286,11 +284,9 @@ int CALL(chain_response)(const pkm_chains *machine, ptrdiff_t n, const double *g
     const chain_geometry of = {machine, geometry, geometry_stride};
     chain_numbers numbers;
     real out[WIDEST];
-    for (ptrdiff_t first = 0; first < n; first += LANES) {
-        ptrdiff_t row[LANES];
+    EACH_BLOCK(first, n, row, count) {
         real lane_q[PKM_MAX_LIMBS], drive[PKM_MAX_LIMBS];
         chain_state at;
-        const int count = block_rows(first, n, row);
         chain_prepare(&of, first, row, &numbers);
         mask held;
         mask good = chain_inspect(machine, &numbers, pose, q, row, lane_q, drive, &at, &held) & held;

@@ -109,6 +109,13 @@ SHARED void prepare_limbs(const pkm_machine *machine, const double *geometry, pt
     }
 }
 
+/* The numbers of limbs for the block of rows from `first` on: once where all rows share them. */
+INLINE void prepare_block(const pkm_machine *machine, const double *geometry, ptrdiff_t stride,
+                          ptrdiff_t first, const ptrdiff_t *row, limb_numbers *limb)
+{
+    if (first == 0 || stride) prepare_limbs(machine, geometry, stride, row, limb);
+}
+
 /* The part of a limb's sphere that depends on the geometry only. */
 INLINE void sphere_of_numbers(int driver, const limb_numbers *limb, FN(limb_sphere) *sphere)
 {

@@ -56,9 +56,7 @@ int CALL(pose_normals)(ptrdiff_t n, int unknowns, const int64_t *first, const in
                        double *pull, double *cost, double *work)
 {
     const ptrdiff_t u = unknowns, width = u + 1;
-    for (ptrdiff_t start = 0; start < n; start += LANES) {
-        ptrdiff_t row[LANES];
-        const int count = block_rows(start, n, row);
+    EACH_BLOCK(start, n, row, count) {
         const pose_equations of = equations_of(row, first, order);
         for (ptrdiff_t j = 0; j < of.most; j++) {
             for (ptrdiff_t a = 0; a < u; a++)
@@ -154,9 +152,7 @@ int CALL(pose_triangle)(ptrdiff_t n, int unknowns, const int64_t *first, const i
 {
     const ptrdiff_t u = unknowns;
     double *diagonal = work, *vectors = work + LANES * u;
-    for (ptrdiff_t start = 0; start < n; start += LANES) {
-        ptrdiff_t row[LANES];
-        const int count = block_rows(start, n, row);
+    EACH_BLOCK(start, n, row, count) {
         const pose_equations of = equations_of(row, first, order);
         mirrors(&of, u, by_unknown, vectors, diagonal);
         for (ptrdiff_t a = 0; a < u; a++)
@@ -177,9 +173,7 @@ int CALL(pose_fit)(ptrdiff_t n, int unknowns, const int64_t *first, const int64_
     const ptrdiff_t u = unknowns;
     double *diagonal = work, *A = diagonal + LANES * u, *x = A + LANES * u * u;
     double *vectors = x + LANES * u;
-    for (ptrdiff_t start = 0; start < n; start += LANES) {
-        ptrdiff_t row[LANES];
-        const int count = block_rows(start, n, row);
+    EACH_BLOCK(start, n, row, count) {
         const pose_equations of = equations_of(row, first, order);
         const ptrdiff_t rank = u < of.most ? u : of.most;
         const real damp = gather(damping, 1, row);
@@ -237,9 +231,7 @@ int CALL(pose_left)(ptrdiff_t n, int unknowns, const int64_t *first, const int64
 {
     const ptrdiff_t u = unknowns;
     double *diagonal = work, *vectors = work + LANES * u;
-    for (ptrdiff_t start = 0; start < n; start += LANES) {
-        ptrdiff_t row[LANES];
-        const int count = block_rows(start, n, row);
+    EACH_BLOCK(start, n, row, count) {
         const pose_equations of = equations_of(row, first, order);
         double *column = vectors + LANES * of.most * u;
         mirrors(&of, u, by_unknown, vectors, diagonal);
@@ -272,9 +264,7 @@ int CALL(pose_spread)(ptrdiff_t n, int unknowns, const int64_t *first, const int
 {
     const ptrdiff_t u = unknowns;
     double *diagonal = work, *vectors = work + LANES * u;
-    for (ptrdiff_t start = 0; start < n; start += LANES) {
-        ptrdiff_t row[LANES];
-        const int count = block_rows(start, n, row);
+    EACH_BLOCK(start, n, row, count) {
         const pose_equations of = equations_of(row, first, order);
         double *column = vectors + LANES * of.most * u;
         mirrors(&of, u, by_unknown, vectors, diagonal);

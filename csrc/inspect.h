@@ -38,15 +38,12 @@ INLINE void closure_map(int map, const pkm_machine *machine, ptrdiff_t n, const 
 {
     const int m = map_m(map), actuators = machine->actuators;
     limb_numbers limb[PKM_MAX_LIMBS];
-    for (ptrdiff_t first = 0; first < n; first += LANES) {
-        ptrdiff_t row[LANES];
+    EACH_BLOCK(first, n, row, count) {
         real lane_pose[6], lane_q[PKM_MAX_LIMBS], state[MAX_STATE], R[9], p[3];
         real residual[PKM_MAX_ROWS], jacobian[PKM_MAX_ROWS * 6];
         real on_map[6], by_free_of_pose[36];
         FN(limb_sphere) sphere[PKM_MAX_LIMBS];
-        const int count = block_rows(first, n, row);
-        if (first == 0 || geometry_stride)
-            prepare_limbs(machine, geometry, geometry_stride, row, limb);
+        prepare_block(machine, geometry, geometry_stride, first, row, limb);
         gather_row(pose, 6, 6, row, lane_pose);
         gather_row(q, actuators, actuators, row, lane_q);
         map_from_pose(map, lane_pose, state);
@@ -117,12 +114,9 @@ int CALL(limbs)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
     if (!pkm_prepared(machine)) return PKM_BAD_MACHINE;
     const int limbs = machine->limbs;
     limb_numbers limb[PKM_MAX_LIMBS];
-    for (ptrdiff_t first = 0; first < n; first += LANES) {
-        ptrdiff_t row[LANES];
+    EACH_BLOCK(first, n, row, count) {
         real lane_pose[6], R[9], p[3];
-        const int count = block_rows(first, n, row);
-        if (first == 0 || geometry_stride)
-            prepare_limbs(machine, geometry, geometry_stride, row, limb);
+        prepare_block(machine, geometry, geometry_stride, first, row, limb);
         gather_row(pose, 6, 6, row, lane_pose);
         FN(pose_frame)(lane_pose, R, p);
         for (int i = 0; i < limbs; i++) {
@@ -151,11 +145,9 @@ int CALL(spheres)(const pkm_machine *machine, ptrdiff_t n, const double *geometr
     FN(limb_sphere) sphere[PKM_MAX_LIMBS];
     const int width = machine->limbs * PKM_SPHERE;
     memset(limb, 0, sizeof limb);
-    for (ptrdiff_t first = 0; first < n; first += LANES) {
-        ptrdiff_t row[LANES];
+    EACH_BLOCK(first, n, row, count) {
         real lane_q[PKM_MAX_LIMBS];
-        const int count = block_rows(first, n, row);
-        if (first == 0) prepare_limbs(machine, geometry, 0, row, limb);
+        prepare_block(machine, geometry, 0, first, row, limb);
         gather_row(q, machine->actuators, machine->actuators, row, lane_q);
         const mask reachable = spheres_at(machine, limb, lane_q, sphere);
         for (int i = 0; i < machine->limbs; i++) {

@@ -139,8 +139,7 @@ int CALL(inverse)(const pkm_machine *machine, ptrdiff_t n, const double *geometr
         }
         for (int t = 0; t < BLOCKS_INVERSE; t++) FN(pose_frame)(lane_pose[t], R[t], p[t]);
         for (int t = 0; t < BLOCKS_INVERSE; t++) {
-            if (first + t == 0 || geometry_stride)
-                prepare_limbs(machine, geometry, geometry_stride, row[t], limb);
+            prepare_block(machine, geometry, geometry_stride, first + t, row[t], limb);
             if (near) gather_row(near, near_stride, machine->actuators, row[t], about);
             inverse_at(machine, limb, R[t], p[t], near ? about : NULL, lane_q[t]);
         }

@@ -189,12 +189,9 @@ INLINE void jacobian_map(int map, const pkm_machine *machine, ptrdiff_t n, const
 {
     limb_numbers limb[PKM_MAX_LIMBS];
     const int width = machine->actuators * map_m(map);
-    for (ptrdiff_t first = 0; first < n; first += LANES) {
-        ptrdiff_t row[LANES];
+    EACH_BLOCK(first, n, row, count) {
         real lane_pose[6], out[PKM_MAX_LIMBS * 6];
-        const int count = block_rows(first, n, row);
-        if (first == 0 || geometry_stride)
-            prepare_limbs(machine, geometry, geometry_stride, row, limb);
+        prepare_block(machine, geometry, geometry_stride, first, row, limb);
         gather_row(pose, 6, 6, row, lane_pose);
         jacobian_block(map, machine, limb, lane_pose, out);
         scatter_row(out, width, jacobian, width, row, count);
@@ -207,12 +204,9 @@ INLINE void response_map(int map, const pkm_machine *machine, ptrdiff_t n, const
 {
     limb_numbers limb[PKM_MAX_LIMBS];
     const int actuators = machine->actuators, width = 6 * columns;
-    for (ptrdiff_t first = 0; first < n; first += LANES) {
-        ptrdiff_t row[LANES];
+    EACH_BLOCK(first, n, row, count) {
         real lane_pose[6], lane_q[PKM_MAX_LIMBS], out[6 * PKM_MAX_LIMBS * SLOTS];
-        const int count = block_rows(first, n, row);
-        if (first == 0 || geometry_stride)
-            prepare_limbs(machine, geometry, geometry_stride, row, limb);
+        prepare_block(machine, geometry, geometry_stride, first, row, limb);
         gather_row(pose, 6, 6, row, lane_pose);
         gather_row(q, actuators, actuators, row, lane_q);
         response_block(map, machine, limb, lane_pose, lane_q, column, columns, twists, out);

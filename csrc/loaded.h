@@ -246,9 +246,7 @@ int CALL(forward_loaded)(const pkm_machine *machine, ptrdiff_t n, const double *
             return PKM_BAD_COLUMN;
     forward_rows(&rigid);
     prepare_limbs(machine, geometry, 0, zero, shared);
-    for (ptrdiff_t first = 0; first < n; first += LANES) {
-        ptrdiff_t row[LANES];
-        const int count = block_rows(first, n, row);
+    EACH_BLOCK(first, n, row, count) {
         switch (machine->map) {
 #define CASE(NAME, name, ...) case MAP_##NAME: rest_##name(&call, shared, row, count); break;
             EACH_MAP(CASE)

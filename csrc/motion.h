@@ -46,12 +46,9 @@ int CALL(rates)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
     if (!pkm_prepared(machine)) return PKM_BAD_MACHINE;
     const int actuators = machine->actuators;
     limb_numbers limb[PKM_MAX_LIMBS];
-    for (ptrdiff_t first = 0; first < n; first += LANES) {
-        ptrdiff_t row[LANES];
+    EACH_BLOCK(first, n, row, count) {
         real T[3][12], rate[PKM_MAX_LIMBS], bend[PKM_MAX_LIMBS];
-        const int count = block_rows(first, n, row);
-        if (first == 0 || geometry_stride)
-            prepare_limbs(machine, geometry, geometry_stride, row, limb);
+        prepare_block(machine, geometry, geometry_stride, first, row, limb);
         for (int k = 0; k < 3; k++) gather_row(motion + 16 * k, 48, 12, row, T[k]);
         for (int a = 0; a < actuators; a++) rate[a] = bend[a] = fill(0.0);
         for (int i = 0; i < machine->limbs; i++) {
@@ -192,12 +189,9 @@ INLINE void motion_map(int map, const pkm_machine *machine, ptrdiff_t n, const d
 {
     const int actuators = machine->actuators;
     limb_numbers limb[PKM_MAX_LIMBS];
-    for (ptrdiff_t first = 0; first < n; first += LANES) {
-        ptrdiff_t row[LANES];
+    EACH_BLOCK(first, n, row, count) {
         real lane_pose[6], lane_q[3][PKM_MAX_LIMBS], T[3][12], rates[12];
-        const int count = block_rows(first, n, row);
-        if (first == 0 || geometry_stride)
-            prepare_limbs(machine, geometry, geometry_stride, row, limb);
+        prepare_block(machine, geometry, geometry_stride, first, row, limb);
         gather_row(pose, 6, 6, row, lane_pose);
         gather_row(q, actuators, actuators, row, lane_q[0]);
         gather_row(q1, actuators, actuators, row, lane_q[1]);

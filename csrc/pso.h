@@ -189,10 +189,8 @@ enum { POSTURES = 64 }; /* at a time */
 INLINE void postures_at(ptrdiff_t n, int actuators, const double *pose, const double *q,
                         posture *out)
 {
-    for (ptrdiff_t first = 0; first < n; first += LANES) {
-        ptrdiff_t row[LANES];
+    EACH_BLOCK(first, n, row, count) {
         real lane_pose[6], R[9], p[3];
-        const int count = block_rows(first, n, row);
         gather_row(pose, 6, 6, row, lane_pose);
         FN(pose_frame)(lane_pose, R, p);
         for (int l = 0; l < count; l++) {
@@ -306,9 +304,7 @@ int CALL(closure_cost)(const pkm_machine *machine, ptrdiff_t particles, const do
     for (ptrdiff_t first = 0; first < n; first += POSTURES) {
         const ptrdiff_t batch = n - first < POSTURES ? n - first : POSTURES;
         postures_at(batch, machine->actuators, pose + 6 * first, q + machine->actuators * first, at);
-        for (ptrdiff_t i = 0; i < particles; i += LANES) {
-            ptrdiff_t row[LANES];
-            const int count = block_rows(i, particles, row);
+        EACH_BLOCK(i, particles, row, count) {
             real sum = gather(cost, 1, row);
             prepare_limbs(machine, geometry, SLOTS * machine->limbs, row, limb);
             sum += squared_closures(machine, limb, batch, at);

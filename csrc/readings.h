@@ -40,13 +40,10 @@ INLINE void readings_map(int map, const pkm_machine *machine, ptrdiff_t n, const
 {
     const int m = map_m(map), actuators = machine->actuators, rows = pkm_closure_count(machine);
     limb_numbers limb[PKM_MAX_LIMBS];
-    for (ptrdiff_t first = 0; first < n; first += LANES) {
-        ptrdiff_t row[LANES];
+    EACH_BLOCK(first, n, row, count) {
         real lane_pose[6], lane_q[PKM_MAX_LIMBS], state[MAX_STATE], R[9], p[3];
         FN(limb_sphere) sphere[PKM_MAX_LIMBS];
-        const int count = block_rows(first, n, row);
-        if (first == 0 || geometry_stride)
-            prepare_limbs(machine, geometry, geometry_stride, row, limb);
+        prepare_block(machine, geometry, geometry_stride, first, row, limb);
         gather_row(pose, 6, 6, row, lane_pose);
         gather_row(q, actuators, actuators, row, lane_q);
         map_from_pose(map, lane_pose, state);
@@ -116,10 +113,8 @@ INLINE void moved_map(int map, ptrdiff_t n, const double *pose, const double *st
                       double *twist)
 {
     const int m = map_m(map);
-    for (ptrdiff_t first = 0; first < n; first += LANES) {
-        ptrdiff_t row[LANES];
+    EACH_BLOCK(first, n, row, count) {
         real lane_pose[6], delta[6], state[MAX_STATE], after[MAX_STATE], found[6], columns[36];
-        const int count = block_rows(first, n, row);
         gather_row(pose, 6, 6, row, lane_pose);
         gather_row(step, m, m, row, delta);
         map_from_pose(map, lane_pose, state);

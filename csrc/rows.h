@@ -133,4 +133,10 @@ INLINE int block_rows(ptrdiff_t start, ptrdiff_t n, ptrdiff_t row[LANES])
     return n - start < LANES ? (int)(n - start) : LANES;
 }
 
+/* The loop over n rows, a block at a time: `first` is its first row, `row` those of its lanes, `count` how
+ * many of them are real. */
+#define EACH_BLOCK(first, n, row, count)                                                            \
+    for (ptrdiff_t first = 0, row[LANES], count;                                                    \
+         first < (n) && (count = block_rows(first, n, row)) > 0; first += LANES)
+
 #endif

@@ -182,9 +182,7 @@ int CALL(arm_links)(const pkm_arm *arm, ptrdiff_t n, const double *error, double
     if (arm->joints < 1) return PKM_BAD_MACHINE;
     const int joints = arm->joints, stride = 12 * (joints + 1);
     const motion home = fill_motion(arm->home);
-    for (ptrdiff_t first = 0; first < n; first += LANES) {
-        ptrdiff_t row[LANES];
-        const int count = block_rows(first, n, row);
+    EACH_BLOCK(first, n, row, count) {
         for (int i = 0; i <= joints; i++) {
             const joint_frame from = frame_of(arm, i);
             joint_frame to = {{{0}}, {{0}}};
@@ -253,9 +251,7 @@ int CALL(arm_forward)(const pkm_arm *arm, const pkm_links *links, ptrdiff_t n, c
                       double *motions)
 {
     if (arm->joints < 1) return PKM_BAD_MACHINE;
-    for (ptrdiff_t first = 0; first < n; first += LANES) {
-        ptrdiff_t row[LANES];
-        const int count = block_rows(first, n, row);
+    EACH_BLOCK(first, n, row, count) {
         real matrix[16];
         const motion T = arm_tool(arm, links, theta, row);
         matrix_of(&T, matrix);
@@ -299,10 +295,8 @@ int CALL(arm_jacobian)(const pkm_arm *arm, const pkm_links *links, int frame, pt
 {
     if (arm->joints < 1) return PKM_BAD_MACHINE;
     const real still[3] = {fill(0.0), fill(0.0), fill(0.0)};
-    for (ptrdiff_t first = 0; first < n; first += LANES) {
-        ptrdiff_t row[LANES];
+    EACH_BLOCK(first, n, row, count) {
         motion T = unmoved();
-        const int count = block_rows(first, n, row);
         const motion view = arm_view(arm, links, frame, theta, row);
         for (int i = 0; i < arm->joints; i++) {
             real w[3], v[3];
@@ -324,10 +318,8 @@ int CALL(arm_error_jacobian)(const pkm_arm *arm, const pkm_links *links, const d
     if (arm->joints < 1) return PKM_BAD_MACHINE;
     const int columns = 6 * arm->joints;
     const real still[3] = {fill(0.0), fill(0.0), fill(0.0)};
-    for (ptrdiff_t first = 0; first < n; first += LANES) {
-        ptrdiff_t row[LANES];
+    EACH_BLOCK(first, n, row, count) {
         motion T = unmoved();
-        const int count = block_rows(first, n, row);
         const motion view = arm_view(arm, links, frame, theta, row);
         for (int i = 0; i < arm->joints; i++) {
             const joint_frame before = frame_of(arm, i);

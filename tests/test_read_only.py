@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -65,7 +67,7 @@ def test_rows_of_inverse_are_contiguous(name: str, laws: bool) -> None:
         assert q.flags.c_contiguous and np.isfinite(q).all()
 
 
-CALLS = {
+CALLS: dict[str, Callable[[pk.Robot, np.ndarray, np.ndarray], object]] = {
     "home": lambda robot, q, poses: robot.home,
     "forward": lambda robot, q, poses: robot.forward(q),
     "inverse": lambda robot, q, poses: robot.inverse(poses),

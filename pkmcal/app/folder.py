@@ -65,8 +65,10 @@ class Folder:
 
     @property
     def files(self) -> list[str]:
-        """The user's files, by name."""
-        return sorted(each.name for each in self.path.iterdir() if self._is_users(each))
+        """The user's files, by name; none where the folder is gone."""
+        with contextlib.suppress(OSError):
+            return sorted(each.name for each in self.path.iterdir() if self._is_users(each))
+        return []
 
     def follow(self) -> None:
         """Take over what somebody else has written into the project's file, in an editor.
@@ -74,8 +76,12 @@ class Folder:
         Raises
         ------
         ValueError
-            A mistake in it, with its line; the state is what it was.
+            A mistake in it, with its line, or the folder is gone; the state is what it was.
         """
+        if not self.path.is_dir():
+            raise ArgumentError(
+                f"{self.path}: the folder of this project is gone: bring it back to go on"
+            )
         if self._follow():
             self.version += 1
 

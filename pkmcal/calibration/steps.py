@@ -37,7 +37,6 @@ from pkmcal.fitted.fit_statistics import (
     identifiability,
     misfit,
     parameter_table,
-    repeats,
     tested_prior,
 )
 from pkmcal.fitted.holdout import HeldOut, draw, evaluate
@@ -239,7 +238,6 @@ def result(rows: Rows, fit: Fit, held: HeldOut, find_slack: bool) -> Identificat
         **table,
         **identifiability(estimator, estimate, len(chosen) - len(table["free"])),
         **fits,
-        **repeats(sure),
         **vars(held),
         converged=estimate.converged,
         evaluations=estimate.evaluations,

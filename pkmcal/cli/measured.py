@@ -85,7 +85,9 @@ FromPnp = Annotated[
         metavar="f=PX,board=WxH",
         help="The file has poses of a board in axes of a camera, as other software found them in"
         " pictures (PnP). The focal length in px and the size of the board in mm tell how accurate"
-        " a pose is in each direction. noise=PX is the noise of a corner; without it it is"
+        " a pose is in each direction. middle=XxY is the middle of the board on it: half the size"
+        " where poses are of its corner, 0x0 where they are of its middle; a camera that was"
+        " pointed at it tells that. noise=PX is the noise of a corner; without it it is"
         " estimated. --camera-on says what the camera is fixed to.",
     ),
 ]

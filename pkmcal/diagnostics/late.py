@@ -20,6 +20,8 @@ from pkmcal.fitted.solution import Solution
 from pkmcal.readings.predicted import Predicted
 from pkmcal.statistics.score_test import Columns, beside
 
+_MOST = 2.0  # ways: rows that are late by more are tried as whole rows
+
 
 @dataclass(frozen=True)
 class Late:
@@ -61,12 +63,12 @@ class Late:
         short = f"{100 * abs(self.share):.2g} % of the way from the pose before"
         if self.share > 0.0:
             return (
-                f"readings are as if taken {short} before the machine arrived ({odds}): let it"
+                f"readings are as if taken {short}, before the machine arrived ({odds}): let it"
                 " settle for longer before each reading, and see that actuators and instrument are"
                 " logged at one moment"
             )
         return (
-            f"actuators are as if logged {short} before the machine arrived where the instrument"
+            f"actuators are as if logged {short}, before the machine arrived where the instrument"
             f" read it ({odds}): log both at one moment, when the machine stands"
         )
 
@@ -86,7 +88,11 @@ def late(found: Solution) -> Late | None:
     scores = {
         leaving: each.score() for leaving, each in ways.items() if len(ways) * each.chance < RARE
     }
-    known = {leaving: score for leaving, score in scores.items() if score is not None}
+    known = {
+        leaving: score
+        for leaving, score in scores.items()
+        if score is not None and abs(score.size[0]) <= _MOST
+    }
     if not known:
         return None
     leaving = min(known, key=lambda each: (known[each].chance, -known[each].drop))

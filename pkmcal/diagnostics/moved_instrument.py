@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.diagnostics.check import RARE
 from pkmcal.diagnostics.columns import of_rows
 from pkmcal.diagnostics.two_machines import row_of_equation
 from pkmcal.display import chance_text, displayed
@@ -22,7 +23,6 @@ from pkmcal.readings.predicted import Predicted
 from pkmcal.statistics.linear_fit import numbered
 from pkmcal.statistics.score_test import jump
 
-CHANCE = 1e-3  # below which something was moved
 _FEWEST = 3  # poses before and after
 _FEW = 10.0  # degrees of freedom below which nothing is told apart
 
@@ -60,7 +60,7 @@ class MovedInstrument:
     @property
     def found(self) -> bool:
         """True if it was moved."""
-        return self.chance < CHANCE
+        return self.chance < RARE
 
     def __str__(self) -> str:
         value, unit = displayed(self.size, self.unit)
@@ -139,11 +139,11 @@ def _tested(
 
     def change(i: int, some: slice, seen: Predicted) -> FloatArray:
         by = seen.by_frame if of_frame else seen.by.get("tool")
-        found = np.zeros((*seen.values[some].shape, 6))
+        found = np.zeros((*seen.values.shape, 6))
         if i in rows and by is not None:
-            mine = np.zeros(len(seen.values), dtype=bool)
+            mine = np.zeros(len(equations.table.sets[i]), dtype=bool)
             mine[rows[i]] = True
-            found[mine[some]] = by[some][mine[some]]
+            found[mine[some]] = by[mine[some]]
         return found
 
     columns = np.empty((len(sure.tested.residual), 6))
@@ -160,10 +160,12 @@ def _tested(
         return None
     since, size, unit = int(named[found.at]), np.empty(0), ""
     before = 0
-    for i, seen in enumerate(equations.prediction.predicted(fit.estimate.evaluation)):
-        mine = visit[before : before + len(seen.values)] >= since
-        before += len(seen.values)
-        if i in rows and mine.any():
-            off = change(i, slice(None), seen)[mine] @ found.size
-            size, unit = np.append(size, (off**2).sum(axis=1)), equations.table.sets[i].units[0]
+    for i, measured in enumerate(equations.table.sets):
+        mine = visit[before : before + len(measured)] >= since
+        before += len(measured)
+        if i not in rows or not mine.any():
+            continue
+        for some, seen in equations.prediction.lots_of(i, fit.estimate.evaluation):
+            off = change(i, some, seen)[mine[some]] @ found.size
+            size, unit = np.append(size, (off**2).sum(axis=1)), measured.units[0]
     return found.chance, since, float(np.sqrt(np.mean(size))) if len(size) else 0.0, unit

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from pkmcal.diagnostics.meant import Meant, Options, in_unit, renamed
 from pkmcal.measurements.inverted import inverted
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.table_layout import ORDERS, OWN_ORDER
@@ -16,70 +17,97 @@ from pkmcal.readings.reading import Family
 
 _OWN = ("XYZ", "XZY", "YXZ", "YZX", "ZXY")  # other orders of an angle about x, y and z each
 _REVERSED = "counts the other way"
+_ANGLES = ("alpha", "beta", "gamma")
 _FACTORS = {
-    "mm": (("metres", 1e3), ("centimetres", 10.0), ("inches", 25.4), ("micrometres", 1e-3)),
+    "mm": (
+        ("metres", 1e3, "m"),
+        ("centimetres", 10.0, "cm"),
+        ("inches", 25.4, "in"),
+        ("micrometres", 1e-3, "um"),
+    ),
     "rad": (
-        ("degrees", np.pi / 180),
-        ("milliradians", 1e-3),
-        ("radians that were taken for degrees", 180 / np.pi),
+        ("degrees", np.pi / 180, "deg"),
+        ("milliradians", 1e-3, "mrad"),
+        ("radians that were taken for degrees", 180 / np.pi, "rad"),
     ),
 }
 
 
 def other_readings(
     measured: Measurements, actuator_units: Sequence[str]
-) -> Iterator[tuple[str, Measurements]]:
+) -> Iterator[tuple[Meant, Measurements]]:
     """Read measurements in other units, with other signs and with columns exchanged."""
     for unit in dict.fromkeys(actuator_units):
         mine = np.array([unit == other for other in actuator_units])
-        for name, factor in _FACTORS.get(unit, ()):
+        names = [f"q{i + 1}" for i in np.flatnonzero(mine)]
+        for name, factor, short in _FACTORS.get(unit, ()):
             q = np.where(mine, measured.actuators * factor, measured.actuators)
-            yield f"the actuators are in {name}", replace(measured, actuators=q)
-    yield "the actuators count the other way", replace(measured, actuators=-measured.actuators)
+            typed = in_unit(measured, names, short)
+            yield Meant(f"the actuators are in {name}", typed), replace(measured, actuators=q)
+    turned = replace(measured, actuators=-measured.actuators)
+    yield Meant("the actuators count the other way"), turned
     yield from exchanges(measured)
     yield from other_values(measured)
     for i, unit in enumerate(actuator_units):
-        for words, factor in (*_FACTORS.get(unit, ()), (_REVERSED, -1.0)):
+        for words, factor, short in (*_FACTORS.get(unit, ()), (_REVERSED, -1.0, "")):
             q = measured.actuators.copy()
             q[:, i] *= factor
-            yield _of_column(f"q{i + 1}", words), replace(measured, actuators=q)
+            yield _of_column(measured, f"q{i + 1}", words, short), replace(measured, actuators=q)
 
 
-def other_values(measured: Measurements) -> Iterator[tuple[str, Measurements]]:
+def other_values(measured: Measurements) -> Iterator[tuple[Meant, Measurements]]:
     """Read what was measured in other units, orders and with other signs; actuators as given."""
     for unit in dict.fromkeys(measured.units):
         mine = np.array([unit == other for other in measured.units])
         what = Family(unit).noun.replace("lengths", "measured lengths")
-        for name, factor in _FACTORS.get(unit, ()):
+        alike = [name for name, other in zip(measured.components, mine, strict=True) if other]
+        for name, factor, short in _FACTORS.get(unit, ()):
             values = measured.values * (factor if mine.all() else np.where(mine, factor, 1.0))
-            yield f"the {what} are in {name}", replace(measured, values=values)
+            typed = in_unit(measured, alike, short)
+            yield Meant(f"the {what} are in {name}", typed), replace(measured, values=values)
     names = measured.components
     for one, other in itertools.combinations(range(len(names)), 2):
         if measured.units[one] != measured.units[other]:
             continue
         values = measured.values.copy()
         values[:, [one, other]] = values[:, [other, one]]
-        yield f"{names[one]} and {names[other]} are exchanged", replace(measured, values=values)
+        yield _exchanged(measured, names[one], names[other]), replace(measured, values=values)
     yield from _other_turns(measured)
     yield from _single_columns(measured)
 
 
-def _single_columns(measured: Measurements) -> Iterator[tuple[str, Measurements]]:
+def _single_columns(measured: Measurements) -> Iterator[tuple[Meant, Measurements]]:
     """Read one column of what was measured in another unit, or with the other sign."""
     rows = measured.values.reshape(len(measured), -1)
     for k, (name, unit) in enumerate(zip(measured.components, measured.units, strict=True)):
-        for words, factor in (*_FACTORS.get(unit, ()), (_REVERSED, -1.0)):
+        for words, factor, short in (*_FACTORS.get(unit, ()), (_REVERSED, -1.0, "")):
             values = rows.copy()
             values[:, k] *= factor
             values = values.reshape(measured.values.shape)
-            yield _of_column(name, words), replace(measured, values=values)
+            yield _of_column(measured, name, words, short), replace(measured, values=values)
 
 
-def _of_column(name: str, words: str) -> str:
-    return f"{name} {words}" if words == _REVERSED else f"{name} is in {words}"
+def _of_column(measured: Measurements, name: str, words: str, short: str) -> Meant:
+    if words == _REVERSED:
+        return Meant(f"{name} {words}")
+    return Meant(f"{name} is in {words}", in_unit(measured, [name], short))
 
 
-def _other_turns(measured: Measurements) -> Iterator[tuple[str, Measurements]]:
+def _exchanged(measured: Measurements, one: str, other: str) -> Meant:
+    typed = renamed(measured, {one: other, other: one})
+    return Meant(f"{one} and {other} are exchanged", typed)
+
+
+def _ordered(measured: Measurements, order: str) -> Options | None:
+    """Read three angles, one after the other, as those of an order."""
+    own = renamed(measured, dict(zip(_ANGLES, "ABC", strict=True)))
+    turned = own if own is not None else renamed(measured, {"rx": "Rx", "ry": "Ry", "rz": "Rz"})
+    if turned is None:
+        return None
+    return (*(own or ()), ("--rotation", order))
+
+
+def _other_turns(measured: Measurements) -> Iterator[tuple[Meant, Measurements]]:
     """Read orientations in other orders, from the other side, quaternions from the other end."""
     from scipy.spatial.transform import Rotation
 
@@ -100,30 +128,31 @@ def _other_turns(measured: Measurements) -> Iterator[tuple[str, Measurements]]:
         ("the scalar of the quaternions is their last number", q[:, [3, 0, 1, 2]]),
         ("the scalar of the quaternions is their first number", q[:, [1, 2, 3, 0]]),
     ):
-        yield words, of(Rotation.from_quat(other))
+        yield Meant(words), of(Rotation.from_quat(other))
     for order in _OWN:
         angles = turned[good][:, ["XYZ".index(axis) for axis in order]]
         words = f"the angles are about turned axes in the order {order} (--rotation {order})"
-        yield words, of(Rotation.from_euler(order, angles))
+        yield Meant(words, ()), of(Rotation.from_euler(order, angles))
     for order in sorted({*ORDERS} - {OWN_ORDER, "XYZ"}):
-        words = (
-            f"the angles are, one after the other, those of {order} (columns A, B, C with"
-            f" --rotation {order})"
-        )
-        yield words, of(Rotation.from_euler(order, turned[good]))
+        typed = _ordered(measured, order)
+        words = f"the angles are, one after the other, those of {order}"
+        if typed is None:
+            words += f" (columns A, B, C with --rotation {order})"
+        yield Meant(words, typed), of(Rotation.from_euler(order, turned[good]))
     words = "are those of the base in the platform's frame"
-    yield f"orientations {words}", of(given.inv())
     if first:
-        yield f"poses {words} (--invert-poses)", inverted(measured)
+        yield Meant(f"orientations {words}"), of(given.inv())
+    yield (
+        Meant(f"{'poses' if first else 'orientations'} {words} (--invert-poses)", ()),
+        inverted(measured),
+    )
 
 
-def exchanges(measured: Measurements) -> Iterator[tuple[str, Measurements]]:
+def exchanges(measured: Measurements) -> Iterator[tuple[Meant, Measurements]]:
     """Read measurements with two actuators exchanged."""
     columns = np.arange(measured.actuators.shape[1])
     for a, b in itertools.combinations(columns, 2):
         order = columns.copy()
         order[[a, b]] = b, a
         swapped = replace(measured, actuators=measured.actuators[:, order])
-        one, other = f"q{a + 1}", f"q{b + 1}"
-        typed = f" (--rename {one}={other} --rename {other}={one}, if the file calls them so)"
-        yield f"{one} and {other} are exchanged{typed if measured.file else ''}", swapped
+        yield _exchanged(measured, f"q{a + 1}", f"q{b + 1}"), swapped

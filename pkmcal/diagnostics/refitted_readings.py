@@ -16,6 +16,7 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.diagnostics.check import Check, at_most_one
+from pkmcal.diagnostics.meant import Meant
 from pkmcal.diagnostics.other_readings import other_values
 from pkmcal.diagnostics.reach import reach
 from pkmcal.estimation.whitening import Whitening
@@ -37,14 +38,14 @@ class Likelier:
     ----------
     number : int
         Of the set, from 0.
-    words : str
+    meant : Meant
         How it reads.
     residual : float
         Geometric mean of its residuals' deviations over those of the reading as given.
     """
 
     number: int
-    words: str
+    meant: Meant
     residual: float
 
 
@@ -172,24 +173,24 @@ def likelier_reading(found: Solution) -> Likelier | None:
         return None
     sets = compared.sets
     trials = {
-        (i, words): compared.at_once(compared.residual(i, other)) + _volume(given, other)
+        (i, meant): compared.at_once(compared.residual(i, other)) + _volume(given, other)
         for i, given in enumerate(sets)
         if given.components
-        for words, other in other_values(given)
+        for meant, other in other_values(given)
         if not _fills(given, other)
     }
     if not trials:
         return None
-    i, words = max(trials, key=lambda each: trials[each])
-    if not np.isfinite(trials[i, words]):
+    i, meant = max(trials, key=lambda each: trials[each])
+    if not np.isfinite(trials[i, meant]):
         return None
-    best = dict(other_values(sets[i]))[words]
+    best = dict(other_values(sets[i]))[meant]
     gain = compared.refined(compared.residual(i, best)) + _volume(sets[i], best)
     gain -= compared.refined(compared.residual(i, sets[i]))
     share = float(np.exp(-gain / count))
     if not gain > np.log(len(trials) / _CHANCE) or share > _SMALLER:
         return None
-    return Likelier(i, words, share)
+    return Likelier(i, meant, share)
 
 
 def _volume(given: Measurements, other: Measurements) -> float:
@@ -206,11 +207,11 @@ def _volume(given: Measurements, other: Measurements) -> float:
 
 
 def _text(found: Solution, seen: Likelier) -> str:
-    several = len(found.fit.equations.table.sets) > 1
-    which = f"measurements {seen.number + 1}" if several else "the measurements"
+    sets = found.fit.equations.table.sets
+    which = f"measurements {seen.number + 1}" if len(sets) > 1 else "the measurements"
     return (
-        f"{which} fit better if {seen.words}: the residuals are then {seen.residual:.2g} times as"
-        " large; see how the file states them"
+        f"{which} fit better, with residuals {seen.residual:.2g} times as large, if"
+        f" {seen.meant.among(sets)}; see how the file states them"
     )
 
 

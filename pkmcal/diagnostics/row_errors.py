@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from pkmcal.diagnostics.families import GROSS
+from pkmcal.diagnostics.meant import Meant, joined_later, renamed
 from pkmcal.diagnostics.other_readings import exchanges, other_readings
 from pkmcal.diagnostics.units import MISFIT_RATIO, likely_unit_errors
 from pkmcal.display import printable
@@ -39,6 +40,7 @@ def likely_mistakes(
     found = likely_unit_errors(datasets, parameters, evaluation)
     found = found or likely_row_errors(datasets, parameters)
     size = GROSS * parameters.robot.length
+    sets = [data.measured for data in datasets]
     both = []
     for i, data in enumerate(datasets):
         if not data.measured.components or len(data.measured) < _LEAST_ROWS:
@@ -50,14 +52,14 @@ def likely_mistakes(
         if present <= size or alone <= size:
             continue
         trials = {
-            f"{first} and {second}": _median(replace(data, measured=other), parameters)
+            first.and_also(second): _median(replace(data, measured=other), parameters)
             for first, exchanged in exchanges(data.measured)
             for second, other in _shifted(replace(data, measured=exchanged))
         }
-        words = min(trials, key=lambda text: trials[text], default="")
-        if words and trials[words] < MISFIT_RATIO * min(alone, present):
+        meant = min(trials, key=lambda each: trials[each], default=None)
+        if meant is not None and trials[meant] < MISFIT_RATIO * min(alone, present):
             which = f"measurements {i + 1}: " if len(datasets) > 1 else ""
-            both.append(which + _better(present, trials[words], words))
+            both.append(which + _better(present, trials[meant], meant.among(sets)))
     return both or found
 
 
@@ -66,21 +68,21 @@ def likely_row_errors(datasets: Sequence[FitData], parameters: Parameters) -> li
 
     A reading of the data that fits far better is named.
     """
-    found = []
+    found, sets = [], [data.measured for data in datasets]
     for i, data in enumerate(datasets):
         if not data.measured.components:
             continue
         present = _median(data, parameters)
         trials = {
-            words: _median(replace(data, measured=other), parameters)
-            for words, other in _readings(data)
+            meant: _median(replace(data, measured=other), parameters)
+            for meant, other in _readings(data)
         }
         if not trials:
             continue
-        words = min(trials, key=lambda text: trials[text])
-        if trials[words] < MISFIT_RATIO * present:
+        meant = min(trials, key=lambda each: trials[each])
+        if trials[meant] < MISFIT_RATIO * present:
             which = f"measurements {i + 1}: " if len(datasets) > 1 else ""
-            found.append(which + _better(present, trials[words], words))
+            found.append(which + _better(present, trials[meant], meant.among(sets)))
     return found
 
 
@@ -106,7 +108,7 @@ def _median(data: FitData, parameters: Parameters) -> float:
     return float(np.median(np.where(np.isfinite(off), off, np.inf))) if read.any() else np.inf
 
 
-def _shifted(data: FitData) -> Iterator[tuple[str, Measurements]]:
+def _shifted(data: FitData) -> Iterator[tuple[Meant, Measurements]]:
     """Read measurements with values moved along the rows, as they were numbered before any left.
 
     Rows that were held out or left out, and targets that were not seen, leave gaps.
@@ -126,13 +128,14 @@ def _shifted(data: FitData) -> Iterator[tuple[str, Measurements]]:
         values = measured.values[read]
         sigma = None if measured.sigma is None else measured.sigma[read]
         where = "before" if shift > 0 else "after"  # where its actuators stand
+        words = f"each reading belongs to the {what} {abs(shift)} {where} it"
         yield (
-            f"each reading belongs to the {what} {abs(shift)} {where} it",
+            Meant(words, joined_later(measured, -shift)),
             replace(measured.select(kept), values=values, sigma=sigma),
         )
 
 
-def _readings(data: FitData) -> Iterator[tuple[str, Measurements]]:
+def _readings(data: FitData) -> Iterator[tuple[Meant, Measurements]]:
     """Read measurements with values moved along the rows and with targets exchanged."""
     yield from _shifted(data)
     measured = data.measured
@@ -148,4 +151,9 @@ def _readings(data: FitData) -> Iterator[tuple[str, Measurements]]:
                 for a, b in enumerate(order)
                 if a != b
             )
-            yield f"target {shown}", replace(measured, target_index=index)
+            columns = {
+                f"{names[a]}.{axis}": f"{names[b]}.{axis}"
+                for a, b in enumerate(order) for axis in "xyz" if a != b
+            }  # fmt: skip
+            meant = Meant(f"target {shown}", renamed(measured, columns))
+            yield meant, replace(measured, target_index=index)

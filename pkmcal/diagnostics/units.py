@@ -52,22 +52,23 @@ def likely_unit_errors(
         if present <= least * size:
             continue
         trials = {
-            words: (_read_as(replace(data, measured=other), parameters, near, read), shrunk)
-            for words, other in other_readings(data.measured, parameters.robot.actuator_units)
+            meant: (_read_as(replace(data, measured=other), parameters, near, read), shrunk)
+            for meant, other in other_readings(data.measured, parameters.robot.actuator_units)
             if (shrunk := _shrunk(data.measured, other)) > 0.0
         }
         # smaller numbers misfit by less, whatever they mean: a machine without lengths fits any
-        misfit = {words: _together(off) / by for words, (off, by) in trials.items()}
+        misfit = {meant: _together(off) / by for meant, (off, by) in trials.items()}
         # exchanges that are equivalent on a symmetric machine misfit alike
         lowest = min(misfit.values())
-        words = next(text for text in trials if misfit[text] <= lowest * (1.0 + TIED))
-        if misfit[words] < MISFIT_RATIO * present and _better_where_reached(trials[words][0], off):
+        meant = next(each for each in trials if misfit[each] <= lowest * (1.0 + TIED))
+        if misfit[meant] < MISFIT_RATIO * present and _better_where_reached(trials[meant][0], off):
             which = f"measurements {i + 1}: " if len(datasets) > 1 else ""
             where = (
                 f"off by {present:.3g} mm" if np.isfinite(present) else "out of the machine's reach"
             )
             found.append(
-                f"{which}{where} as given, but by {_together(trials[words][0]):.3g} mm if {words}"
+                f"{which}{where} as given, but by {_together(trials[meant][0]):.3g} mm if"
+                f" {meant.among([each.measured for each in datasets])}"
             )
     return found
 

@@ -1,6 +1,6 @@
 """Choice of the parameters of a calibration: what is free, in which sessions and sets.
 
-And with which start, prior and bounds, by the names that the user states.
+And with which start; `priors_and_bounds` has what is stated of each by its name.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from pkmcal.arguments import did_you_mean, shown
 from pkmcal.arrays import FloatArray
 from pkmcal.estimation.fit_data import FRAME, PLACE, FitData, Numbers
 from pkmcal.estimation.own_residuals import (
@@ -22,14 +21,13 @@ from pkmcal.estimation.own_residuals import (
     brought_numbers,
     residual_name,
 )
-from pkmcal.estimation.parameters import Asked, Bounds, Parameters
-from pkmcal.estimation.prior_functions import is_function, prior_functions
+from pkmcal.estimation.parameters import Asked, Parameters
+from pkmcal.estimation.prior_functions import prior_functions
+from pkmcal.estimation.priors_and_bounds import bounds_by_name, prior_deviations
 from pkmcal.estimation.scales import unit_scales
-from pkmcal.estimation.sessions import Scope, label, matches, scopes
+from pkmcal.estimation.sessions import Scope, label, scopes
 from pkmcal.estimation.uncertain_numbers import own_deviations, spread, uncertain_names
-from pkmcal.exceptions import ArgumentError, ArgumentTypeError
-from pkmcal.geometry.elastic import is_kinematic
-from pkmcal.geometry.stated_uncertainty import LEAST, MOST
+from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.calibratable import Calibratable
 
 _EXACT = 1e-7  # mm that a number moves the machine by: what is stated to be less is exact as well
@@ -104,8 +102,8 @@ def parameters(
     values = np.concatenate(starts)[number_of]
     count = int(np.count_nonzero(number_of < len(places)))
     found = [n if not own else "" for n, own in zip(names, uncertain, strict=True)]
-    lower, upper = _bounds(asked.bounds, found, values, strict=like is None)
-    prior = _prior(asked, found, scale, count, strict=like is None)
+    lower, upper = bounds_by_name(asked.bounds, found, values, strict=like is None)
+    prior = prior_deviations(asked, found, scale, count, strict=like is None)
     prior[uncertain] = np.sqrt(np.diagonal(of_uncertain))
     made = Parameters(
         names=names,
@@ -349,75 +347,3 @@ def _where_read(data: FitData, point: tuple[str, str]) -> tuple[str, ...]:
                 session = data.measured.session
                 return ("",) if session is None else tuple(dict.fromkeys(session[mine].tolist()))
     return ()
-
-
-def _matching(argument: str, pattern: object, names: Sequence[str], strict: bool) -> list[int]:
-    if not isinstance(pattern, str):
-        raise ArgumentTypeError(f"{argument}: names must be str, found {pattern!r}")
-    hits = [i for i, name in enumerate(names) if name and matches(pattern, name)]
-    if strict and not hits:
-        known = did_you_mean(pattern, filter(None, names))
-        raise ArgumentError(f"{argument}: no free parameter matches {pattern!r}{known}")
-    return hits
-
-
-def _prior(
-    asked: Asked, names: Sequence[str], scale: FloatArray, of_machine: int, strict: bool
-) -> FloatArray:
-    """Return the prior of each parameter: as effects state it, unless `prior` names it."""
-    prior = asked.prior
-    sigma = np.full(len(names), np.inf)
-    own = asked.of_effects
-    of_effects = [own.get(name.partition("@")[0], np.inf) if own else np.inf for name in names]
-    if isinstance(prior, Mapping):
-        sigma[:] = of_effects
-    if isinstance(prior, Mapping):
-        for pattern, value in prior.items():
-            if is_function(pattern, value):
-                continue
-            hits = _matching("prior", pattern, names, strict)
-            sigma[hits] = _positive(f"prior of {pattern}", value)
-        return sigma
-    if prior is not None:
-        sigma[:of_machine] = _positive("prior", prior) * scale[:of_machine]
-        sigma[[not is_kinematic(name) for name in names]] = np.inf  # forces are no lengths
-    return np.where(np.isfinite(of_effects), of_effects, sigma)
-
-
-def _positive(what: str, value: object) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
-        raise ArgumentTypeError(f"{what} must be a number, a standard deviation; found {value!r}")
-    if not value > 0:
-        raise ArgumentError(f"{what} must be positive; found {value}")
-    if not (LEAST <= value <= MOST or value == np.inf):
-        raise ArgumentError(
-            f"{what} must lie between {LEAST:g} and {MOST:g}, or be inf; found {shown(value)}"
-        )
-    return float(value)
-
-
-def _bounds(
-    bounds: Bounds, names: Sequence[str], start: FloatArray, strict: bool
-) -> tuple[FloatArray, FloatArray]:
-    lower, upper = np.full(len(names), -np.inf), np.full(len(names), np.inf)
-    if bounds is None:
-        return lower, upper
-    if not isinstance(bounds, Mapping):
-        raise ArgumentTypeError(
-            f"bounds must map names to (lower, upper); found {type(bounds).__name__}"
-        )
-    for pattern, pair in bounds.items():
-        try:
-            low, high = (float(end) for end in pair)
-        except (TypeError, ValueError, OverflowError):
-            raise ArgumentError(
-                f"bounds of {pattern} must be (lower, upper); found {pair!r}"
-            ) from None
-        for i in _matching("bounds", pattern, names, strict):
-            if not low <= start[i] <= high or not low < high:
-                raise ArgumentError(
-                    f"bounds of {names[i]} must enclose its present value {start[i]:.9g};"
-                    f" found {low:g} to {high:g}"
-                )
-            lower[i], upper[i] = low, high
-    return lower, upper

@@ -18,7 +18,7 @@ from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.prediction import Prediction
 from pkmcal.exceptions import ArgumentError
 from pkmcal.readings import orientation
-from pkmcal.readings.predicted import At, require_arguments
+from pkmcal.readings.predicted import At, of_the_package, require_arguments
 from pkmcal.readings.reading import Reading
 from pkmcal.readings.unknowns import Dependence
 
@@ -46,19 +46,15 @@ def require_true(prediction: Prediction, evaluation: Evaluation) -> None:
         effects = [
             of_rows
             for effect, of_rows in zip(data.effects, prediction.effects[i], strict=True)
-            if not _of_the_package(effect)
+            if not of_the_package(effect)
         ]
-        own = bool(reading.components) and not _of_the_package(reading)
+        own = bool(reading.components) and not of_the_package(reading)
         if own:
             _compare_reading(prediction, i, evaluation, steps)
         for effect in effects:
             _compare_effect(prediction, i, evaluation, effect, steps)
         if own or effects:
             _compare_order(prediction, i, evaluation)
-
-
-def _of_the_package(given: object) -> bool:
-    return type(given).__module__.partition(".")[0] == __name__.partition(".")[0]
 
 
 def _steps(dependences: Iterable[Dependence]) -> dict[str, FloatArray]:
@@ -87,7 +83,7 @@ def _compare_reading(
 
     for at, numbers, rows in prediction.in_frames(i, evaluation.pose, evaluation.theta):
         named = {name: own for name, own in numbers.items() if name != "tool_origin"}
-        require_arguments(reading.name, reading.predict, at, named, "dependences")
+        require_arguments(reading, at, named, "dependences")
         seen = reading.predict(at, **numbers)
         for k, step in enumerate(of_twist):
             by = f"by_twist, by {_TWIST[k]}"
@@ -203,7 +199,7 @@ def _compare_order(prediction: Prediction, i: int, evaluation: Evaluation) -> No
         if (off > _ORDER * np.abs(there).max(initial=0.0)).any():
             data = prediction.datasets[i]
             every = (data.measured.instrument, *data.effects)
-            mine = [type(each).__name__ for each in every if not _of_the_package(each)]
+            mine = [type(each).__name__ for each in every if not of_the_package(each)]
             raise ArgumentError(
                 f"{' or '.join(mine)}: row {order[np.argmax(off)]} is predicted otherwise where the"
                 " rows stand in another order, as they do where some are left out: numbers of rows"

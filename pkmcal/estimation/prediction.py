@@ -22,7 +22,13 @@ from pkmcal.estimation.shapes import effect_of_rows, require_derivatives, requir
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.readings import orientation
-from pkmcal.readings.predicted import At, Predicted, joined, require_predicted
+from pkmcal.readings.predicted import (
+    At,
+    Predicted,
+    joined,
+    predicted_by,
+    require_predicted,
+)
 
 _BATCH = 1024  # rows whose derivatives by the parameters are made at once, as many as caches hold
 _LOT = 16 * _BATCH  # rows that are predicted at once: derivatives take ten times what was read
@@ -199,15 +205,14 @@ class Prediction:
     ) -> Predicted:
         """Predict some rows of a set; `numbers` are `arguments_of` all of them."""
         m, count = self.table.sets[i], len(self.table.pose_of[i][rows])
-        components = len(m.instrument.components)
-        if not components:
+        if not m.instrument.components:
             return Predicted(np.empty((count, 0)), np.empty((count, 0, 6)))
         parts = [
-            (m.instrument.predict(at, **own), place)
+            (predicted_by(m.instrument, at, own), place)
             for at, own, place in self.in_frames(i, pose, theta, rows, numbers)
         ]
         alone = joined(*map(list, zip(*parts, strict=True)))
-        require_predicted(m.kind, components, count, alone)
+        require_predicted(m.instrument, count, alone)
         moved = self._moved(i, rows, alone, pose, theta, numbers)
         estimated = {name: columns[rows] for name, columns in self.numbers[i].items()}
         require_derivatives(m.instrument, moved, estimated)

@@ -25,9 +25,10 @@ def require_derivatives(
     """Refuse a prediction that does not say how it follows the arguments that are estimated."""
     for name, columns in numbers.items():
         if name not in found.by:
+            known = ", ".join(map(repr, found.by)) or "none"
             raise ArgumentError(
                 f"kind: {name!r} is estimated, but predict of {reading.name!r}, or moved of an"
-                " effect, gives no derivative by it (by)"
+                f" effect, gives no derivative by it (by has {known})"
             )
         rows, k = found.values.shape
         require_shape(

@@ -1,4 +1,4 @@
-"""Uncertainty of an estimate: linear fit at the solution, covariance and noise."""
+"""Uncertainty of an estimate: covariance and noise, by its linear model."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from pkmcal.estimation.cut_readings import Cut, cut_readings
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.estimate import Estimate
 from pkmcal.estimation.estimator import FEW, Estimator
-from pkmcal.estimation.labels import Labels, component_classes, labels, poses_of_rows
+from pkmcal.estimation.labels import Labels, component_classes, poses_of_rows
+from pkmcal.estimation.linear_model import LinearModel, prior_residual
 from pkmcal.estimation.misfits import rounding, rounding_of_readings
 from pkmcal.estimation.set_noise import slipped
 from pkmcal.measurements.measurements import Measurements
@@ -21,14 +22,11 @@ from pkmcal.statistics.covariance import Covariance, CovarianceRule, covariance
 from pkmcal.statistics.linear_fit import (
     LinearFit,
     Solved,
-    in_unit_basis,
     met_exactly,
     numbered,
     reweighted,
-    unit_basis,
 )
 from pkmcal.statistics.noise import Noise, Split, joined, noise, split
-from pkmcal.statistics.pseudo_residuals import pseudo_residuals
 from pkmcal.statistics.variance_components import told_apart, variance_components
 
 ROUNDED = 1e3  # times errors of rounding, below which residuals may be nothing else
@@ -350,9 +348,6 @@ class Uncertainty:
         return joined(parts)
 
 
-LinearModel = tuple[Labels, LinearFit]  # what equations belong to, and the fit as a linear one
-
-
 def uncertainty(
     estimator: Estimator,
     estimate: Estimate,
@@ -425,28 +420,3 @@ def _of_own_deviations(
     if found is None:
         return fit, beyond
     return reweighted(fit, np.sqrt(found.variances)[found.classes], beyond)
-
-
-def solved(estimator: Estimator, estimate: Estimate) -> LinearModel:
-    """The linear model at an estimate."""
-    named, state = labels(estimator.equations), estimate.state
-    residual = estimate.residual
-    if estimator.loss != "linear":
-        residual, _, _ = pseudo_residuals(
-            residual,
-            estimator.equations.blocks.components,
-            estimate.weights,
-            state.loss.decline(residual),
-            state.determined.rank,
-        )
-    back, design = estimate.half, estimate.design[:, : state.determined.rank]
-    if estimator.loss != "linear":  # equations count alike, their residuals are other ones
-        back = unit_basis(estimate.triangle, estimate.prior, state.determined.identifiable)
-        design = estimate.change(back)
-    fit = in_unit_basis(design, residual, estimate.prior, back, named.pose, named.component)
-    return named, replace(fit, exact=estimate.exact_freedom)
-
-
-def prior_residual(estimator: Estimator, estimate: Estimate) -> FloatArray:
-    """Residuals (q,) of the prior's rows."""
-    return estimator.equations.parameters.prior_left(estimate.evaluation.theta)

@@ -9,7 +9,7 @@ from pkmcal.estimation.coarse_readings import component_of
 from pkmcal.estimation.estimate import Estimate
 from pkmcal.estimation.estimator import Estimator
 from pkmcal.estimation.labels import component_classes
-from pkmcal.estimation.uncertainty import LinearModel, prior_residual
+from pkmcal.estimation.linear_model import LinearModel, prior_residual
 from pkmcal.statistics.clusters import shared_error_score
 from pkmcal.statistics.covariance import SHARED
 from pkmcal.statistics.variance_components import told_apart

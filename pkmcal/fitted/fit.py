@@ -13,8 +13,9 @@ from pkmcal.estimation.estimate import Estimate
 from pkmcal.estimation.estimator import Estimator
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.identifiability import decompose
+from pkmcal.estimation.linear_model import LinearModel, solved
 from pkmcal.estimation.parameters import Parameters
-from pkmcal.estimation.uncertainty import LinearModel, Uncertainty, solved, uncertainty
+from pkmcal.estimation.uncertainty import Uncertainty, uncertainty
 from pkmcal.fitted.datum import NO_DATUM, Datum
 from pkmcal.fitted.held_numbers import with_considered
 from pkmcal.fitted.slack import Cell

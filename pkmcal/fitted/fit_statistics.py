@@ -1,4 +1,4 @@
-"""Statistics of a fit, part by part: parameters, rank, misfit, repeats, search."""
+"""Statistics of a fit, part by part: parameters, rank, misfit."""
 
 from __future__ import annotations
 
@@ -154,16 +154,6 @@ def misfit(
         "residuals": end.residuals,
         "rows": equations.table.rows,
         "outliers": tuple(equations.table.rows[named].tolist()),
-    }
-
-
-def repeats(uncertainty: Uncertainty) -> dict[str, Any]:
-    """Scatter of repeated poses and what the model misses beyond it."""
-    whitened, lengths = uncertainty.repeats(), uncertainty.repeats(plain=True)
-    return {
-        "repeatability": lengths.scatter,
-        "lack_of_fit": lengths.beyond,
-        "lack_of_fit_chance": whitened.chance,
     }
 
 

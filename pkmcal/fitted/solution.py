@@ -23,6 +23,7 @@ from pkmcal.fitted.holdout import HeldOut
 from pkmcal.fitted.nuisances import Nuisance
 from pkmcal.fitted.slack import SlackCable
 from pkmcal.kinematics.robot import Robot
+from pkmcal.statistics.noise import Split
 from pkmcal.statistics.prior_test import PriorTest
 
 if TYPE_CHECKING:  # which brings its own; the module is of Python 3.13 and later
@@ -163,12 +164,6 @@ class Solution(HeldOut, Generic[Machine]):
         Numbers of the fitted rows, counted through all sets from 0.
     outliers : tuple of int
         Rows that the others contradict, numbered likewise.
-    repeatability : float
-        Scatter of repeats about their mean, mm per coordinate; NaN without repeats.
-    lack_of_fit : float
-        What the model misses at a pose beyond that scatter, mm per coordinate.
-    lack_of_fit_chance : float
-        p-value of the F test of lack of fit: small where the model misses something.
     robot : Robot or SerialArm
         The machine with the identified geometry; that of the last session.
     fit : Fit
@@ -235,9 +230,6 @@ class Solution(HeldOut, Generic[Machine]):
     residuals: tuple[FloatArray, ...]
     rows: IntArray
     outliers: tuple[int, ...]
-    repeatability: float
-    lack_of_fit: float
-    lack_of_fit_chance: float
     robot: Machine
     fit: Fit
     converged: bool
@@ -268,6 +260,25 @@ class Solution(HeldOut, Generic[Machine]):
     def pose_noise(self) -> tuple[float, ...]:
         """What rows of one pose share beside it, mm per coordinate: pose and model errors."""
         return tuple(float(np.sqrt(shared)) for _, shared in self.fit.uncertainty.noises)
+
+    @property
+    def repeatability(self) -> float:
+        """Scatter of repeats about their mean, mm per coordinate; NaN without repeats."""
+        return self._repeats.scatter
+
+    @property
+    def lack_of_fit(self) -> float:
+        """What the model misses at a pose beyond that scatter, mm per coordinate."""
+        return self._repeats.beyond
+
+    @cached_property
+    def lack_of_fit_chance(self) -> float:
+        """P-value of the F test of lack of fit: small where the model misses something."""
+        return self.fit.uncertainty.repeats().chance
+
+    @cached_property
+    def _repeats(self) -> Split:
+        return self.fit.uncertainty.repeats(plain=True)
 
     @cached_property
     def distances_before(self) -> Distances:

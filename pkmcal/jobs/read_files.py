@@ -99,19 +99,19 @@ class Pnp(NamedTuple):
     ----------
     focal : float
         Focal length, px.
-    board : (float, float)
-        Width and height, mm.
+    board : tuple of float
+        Width and height, mm; then x and y of its middle, where they are stated.
     noise : float or None
         Of corners, px; None: to be estimated.
     """
 
     focal: float
-    board: tuple[float, float]
+    board: tuple[float, ...]
     noise: float | None
 
 
 def read_pnp(text: str) -> Pnp:
-    """Read ``f=640,board=160x120[,noise=0.3]``.
+    """Read ``f=640,board=160x120[,middle=80x60][,noise=0.3]``.
 
     Raises
     ------
@@ -119,20 +119,23 @@ def read_pnp(text: str) -> Pnp:
         Anything else.
     """
     expected = ArgumentError(
-        f"--from-pnp {text}: expected f=FOCAL,board=WIDTHxHEIGHT[,noise=PX], as"
-        " f=640,board=160x120: px and mm"
+        f"--from-pnp {text}: expected f=FOCAL,board=WIDTHxHEIGHT[,middle=XxY][,noise=PX],"
+        " as f=640,board=160x120,middle=80x60: px and mm"
     )
     parts = dict(map(named, text.split(",")))
-    if not {"f", "board"} <= parts.keys() <= {"f", "board", "noise"}:
+    if not {"f", "board"} <= parts.keys() <= {"f", "board", "middle", "noise"}:
         raise expected
     try:
         width, height = map(typed, parts["board"].lower().split("x"))
+        middle = [*map(typed, parts["middle"].lower().split("x"))] if "middle" in parts else []
         focal, noise = typed(parts["f"]), typed(parts["noise"]) if "noise" in parts else None
     except ValueError:
         raise expected from None
+    if len(middle) not in (0, 2):
+        raise expected
     if not min(width, height, focal, 1.0 if noise is None else noise) > 0.0:
-        raise ArgumentError(f"--from-pnp {text}: all numbers must be above 0")
-    return Pnp(focal, (width, height), noise)
+        raise ArgumentError(f"--from-pnp {text}: focal length, size and noise must be above 0")
+    return Pnp(focal, (width, height, *middle), noise)
 
 
 def cameras(reading: Reading) -> list[Camera]:

@@ -9,6 +9,7 @@ from typing import Any
 from pkmcal.files.csv_writer import WrittenColumn, numbered, write_csv
 from pkmcal.measurements.field import row_fields
 from pkmcal.readings.constants import columns_of_constants
+from pkmcal.readings.registry import require_read_back
 
 
 def write_measurements(
@@ -37,7 +38,11 @@ def write_measurements(
     ------
     OSError
         The file cannot be written; one that was there before is untouched.
+    TypeError
+        A kind of the user's own whose columns are those of another kind: read back without it, its
+        values would be taken for those.
     """
+    require_read_back(measurements.instrument, measurements.values, measurements.actuators)
     headings, cells = headed_cells(measurements, reading)
     write_csv(path, headings, cells, comment=comment)
 

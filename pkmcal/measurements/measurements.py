@@ -158,7 +158,7 @@ class Measurements(Result):
 
     actuators: FloatArray
     values: FloatArray
-    kind: Kind | str = "position"
+    kind: Kind = "position"
     instrument: Reading = dataclasses.field(default_factory=lambda: as_reading("position"))
     actuator_units: tuple[str, ...] | None = None
     target: FloatArray | None = None
@@ -187,7 +187,7 @@ class Measurements(Result):
         self,
         actuators: ArrayLike,
         values: ArrayLike | None,
-        kind: Kind | Reading | str | None = None,
+        kind: Kind | Reading | None = None,
         *,
         sigma: ArrayLike | Tracker | None = None,
         target: ArrayLike | None = None,

@@ -8,6 +8,7 @@ pixels of a board of stand-in corners that a stand-in camera sees there.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -16,7 +17,7 @@ import numpy as np
 from pkmcal.arguments import instance, number, word
 from pkmcal.arrays import FloatArray
 from pkmcal.core import instruments, screws
-from pkmcal.exceptions import ArgumentError
+from pkmcal.exceptions import ArgumentError, CalibrationWarning
 from pkmcal.measurements.inverted import inverted
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.readings import twists
@@ -24,6 +25,7 @@ from pkmcal.readings.boards import Board
 from pkmcal.readings.rows import numbers
 
 _CORNERS = 5  # along and down a stand-in board
+_BESIDE = 0.5  # of a board's larger side, within which lines of sight tell where its middle is
 _SLANTING = np.radians(75.0)  # from the normal of the board, of lines of sight that end on it
 
 
@@ -44,9 +46,10 @@ def from_pnp(
         ``solvePnP`` and the like find it.
     focal : float
         Focal length of the camera, px.
-    board : Board, or (width, height)
-        What it saw; of an unknown board its size, mm, about where the lines of sight meet its
-        plane z = 0.
+    board : Board, (width, height) or (width, height, x, y)
+        What it saw; of an unknown board its size and where its middle is on it, mm: half the size
+        where poses are of its corner, 0, 0 where they are of its middle. Without that it is where
+        the lines of sight meet the plane z = 0, of a camera that was pointed at the board.
     on : {"base", "platform"}
         What the camera is fixed to; the board is on the other. On the platform the poses are
         turned round: frame and tool are the base and the camera in axes of the board.
@@ -64,6 +67,11 @@ def from_pnp(
     ValueError
         Other readings; a board that is not before the camera; a size, a focal length or a noise
         that is not above 0.
+
+    Warns
+    -----
+    CalibrationWarning
+        Lines of sight do not tell where on the board its middle is.
 
     Examples
     --------
@@ -105,23 +113,41 @@ def _corners(pose: FloatArray, board: Board | Sequence[float]) -> FloatArray:
     if isinstance(board, Board):
         return board.places
     size = numbers("board", board)
-    if size.shape != (2,) or not (size > 0.0).all():
-        raise ArgumentError(f"board must be its width and height in mm, above 0; found {board!r}")
+    if size.shape not in ((2,), (4,)) or not (size[:2] > 0.0).all():
+        raise ArgumentError(
+            "board must be its width and height in mm, above 0, and perhaps x and y of its middle;"
+            f" found {board!r}"
+        )
     side = np.linspace(-0.5, 0.5, _CORNERS)
     x, y = np.meshgrid(side * size[0], side * size[1])
-    middle = _middle(pose)
+    middle = size[2:] if len(size) == 4 else _middle(pose, size)
     return np.column_stack([x.ravel() + middle[0], y.ravel() + middle[1], np.zeros(x.size)])
 
 
-def _middle(pose: FloatArray) -> FloatArray:
-    """Point of a board (2,), the median, where lines of sight meet its plane; else its origin."""
+def _middle(pose: FloatArray, size: FloatArray) -> FloatArray:
+    """Point of a board (2,) of some size, the median, where lines of sight meet its plane.
+
+    Its origin where none does. A board elsewhere is wrong by much: how far off a pose is turns
+    about the middle of what was seen.
+    """
     camera = np.linalg.inv(screws.frames(pose))
     eye, ahead = camera[:, :3, 3], camera[:, :3, 2]
     meets = np.abs(ahead[:, 2]) > np.cos(_SLANTING)
     if not meets.any():
         return np.zeros(2)
     eye, ahead = eye[meets], ahead[meets]
-    found: FloatArray = np.median(eye - ahead * (eye[:, 2] / ahead[:, 2])[:, None], axis=0)[:2]
+    every = (eye - ahead * (eye[:, 2] / ahead[:, 2])[:, None])[:, :2]
+    found: FloatArray = np.median(every, axis=0)
+    away = float(np.median(np.linalg.norm(every - found, axis=1)))
+    if away > _BESIDE * float(size.max()):
+        warnings.warn(
+            f"board: where its middle is nobody knows: lines of sight meet its plane {away:.3g} mm"
+            f" about a point, and it is {size[0]:g} x {size[1]:g} mm; state x and y of its middle"
+            " as well (middle=XxY), half the size where poses are of its corner, 0 and 0 where they"
+            " are of its middle",
+            CalibrationWarning,
+            stacklevel=4,  # of who calls `from_pnp`
+        )
     return found
 
 

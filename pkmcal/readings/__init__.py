@@ -16,6 +16,7 @@ from pkmcal.readings.predicted import At as At
 from pkmcal.readings.predicted import Predicted as Predicted
 from pkmcal.readings.reading import Reading as Reading
 from pkmcal.readings.touches import Touch as Touch
+from pkmcal.readings.touches import TouchDistance as TouchDistance
 from pkmcal.readings.turnings import Orientation as Orientation
 from pkmcal.readings.turnings import Pose as Pose
 from pkmcal.readings.turnings import Tilt as Tilt

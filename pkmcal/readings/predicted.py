@@ -12,7 +12,7 @@ import numpy as np
 from pkmcal.arguments import kind
 from pkmcal.arrays import FloatArray, IntArray, chained
 from pkmcal.core.poses import NOWHERE
-from pkmcal.exceptions import ArgumentError, ArgumentTypeError
+from pkmcal.exceptions import ArgumentError, ArgumentTypeError, Error
 from pkmcal.readings.measured import Measured
 
 MOTION = 6  # numbers of the motion of a lot of rows: ω, then v
@@ -97,9 +97,36 @@ def require_shape(what: str, found: object, shape: tuple[int, ...]) -> None:
         raise ArgumentError(f"{what} must be doubles; found {found.dtype}")
 
 
-def require_predicted(name: str, components: int, rows: int, found: object) -> None:
-    """Refuse what `predict` of a kind returned without values (N, k) or derivatives (N, k, 6)."""
-    what = f"kind: predict of {name!r}"
+def of_the_package(given: object) -> bool:
+    """Return whether the class of an object is one of the package, and none of the user's."""
+    return type(given).__module__.partition(".")[0] == __name__.partition(".")[0]
+
+
+def predicted_by(reading: Any, at: At, numbers: Mapping[str, Any]) -> Predicted:
+    """Return what a reading predicts; where a class of the user's own fails, it is named.
+
+    Raises
+    ------
+    TypeError
+        An argument that its `predict` does not take or misses, a derivative that it forgot, …
+    """
+    try:
+        found: Predicted = reading.predict(at, **numbers)
+    except Exception as error:
+        if isinstance(error, Error) or of_the_package(reading):
+            raise
+        given = ", ".join(["at", *numbers])
+        raise ArgumentTypeError(
+            f"kind: predict of the class {type(reading).__name__} failed with"
+            f" {type(error).__name__}: {error}; it is given {given} (what its methods arguments and"
+            " dependences name) and has to return Predicted(values, by_twist, by)"
+        ) from error
+    return found
+
+
+def require_predicted(reading: Any, rows: int, found: object) -> None:
+    """Refuse what `predict` of a reading returned without values (N, k), derivatives (N, k, 6)."""
+    what, components = f"kind: predict of {reading.name!r}", len(reading.components)
     if not isinstance(found, Predicted):
         raise ArgumentTypeError(f"{what} must return Predicted(…); found {kind(found)}")
     require_shape(f"{what}: values", found.values, (rows, components))
@@ -107,16 +134,15 @@ def require_predicted(name: str, components: int, rows: int, found: object) -> N
     for side in ("by_frame", "by_other"):
         if getattr(found, side) is not None:
             require_shape(f"{what}: {side}", getattr(found, side), (rows, components, 6))
+    if not isinstance(found.by, Mapping):
+        raise ArgumentTypeError(
+            f"{what}: by must have the derivative by each argument by its name, as in"
+            f' {{"target": …}}; found {kind(found.by)}'
+        )
 
 
-def require_arguments(
-    name: str,
-    predict: Callable[..., Any],
-    at: At,
-    given: Mapping[str, Any],
-    method: str,
-) -> None:
-    """Refuse an argument that `predict` of a kind swallows: a mistyped name.
+def require_arguments(reading: Any, at: At, given: Mapping[str, Any], method: str) -> None:
+    """Refuse an argument that `predict` of a reading swallows: a mistyped name.
 
     That is one which it neither lists nor hands on to what its values depend on.
 
@@ -127,14 +153,14 @@ def require_arguments(
     TypeError
         No mapping of names.
     """
-    what = f"kind: {method} of {name!r}"
+    what = f"kind: {method} of {reading.name!r}"
     if not isinstance(given, Mapping):
         found = kind(given)
         raise ArgumentTypeError(f"{what} must return arguments of predict by name; found {found}")
-    listed = inspect.signature(predict).parameters
+    listed = inspect.signature(reading.predict).parameters
     for each in given.keys() - listed.keys():
         other = {**given, each: np.asarray(given[each]) + 1.0}
-        one, two = (predict(at, **numbers) for numbers in (given, other))
+        one, two = (predicted_by(reading, at, numbers) for numbers in (given, other))
         if isinstance(one, Predicted) and np.array_equal(one.values, two.values, equal_nan=True):
             raise ArgumentError(f"{what}: {each!r} is no argument of predict, which ignores it")
 

@@ -30,6 +30,7 @@ from pkmcal.readings.predicted import (
     Lots,
     Predicted,
     Shared,
+    predicted_by,
     require_arguments,
     require_predicted,
 )
@@ -323,9 +324,9 @@ class Reading:
     def simulated(self, m: Measured, solve: Solve) -> FloatArray:
         """Compute what the instrument would read without noise, (N, k)."""
         at, given = At(solve(m.actuators, "q").pose, axis=np.full(len(m), 2)), self.arguments(m)
-        require_arguments(self.name, self.predict, at, given, "arguments")
-        found = self.predict(at, **given)
-        require_predicted(self.name, len(self.components), len(m), found)
+        require_arguments(self, at, given, "arguments")
+        found = predicted_by(self, at, given)
+        require_predicted(self, len(m), found)
         return found.values
 
     def doubts(self, m: Measured) -> Iterator[str]:

@@ -1,36 +1,25 @@
-"""Every kind of reading by its name."""
+"""Every kind of reading by its name: a class that `pkmcal.readings` exports is one."""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import cache
-from typing import Literal, NamedTuple, cast
+from typing import NamedTuple, cast
 
+import pkmcal.readings as exported
 from pkmcal.arguments import shown, word
+from pkmcal.arrays import FloatArray
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.files.csv_table import Table
-from pkmcal.readings.angles import Angle
-from pkmcal.readings.camera import Camera
 from pkmcal.readings.closure import Closure
-from pkmcal.readings.distances import Between, Distance, RelativeDistance
-from pkmcal.readings.points import Height, Position
 from pkmcal.readings.reading import Reading
-from pkmcal.readings.touches import Touch, TouchDistance
-from pkmcal.readings.turnings import Orientation, Pose, Tilt
 
-Kind = Literal[
-    "pose", "position", "height", "distance", "closure",
-    "between", "relative-distance", "orientation", "tilt", "angle", "touch", "touch-distance",
-    "pixel",
-]  # fmt: skip
+Kind = str  # a word of `KINDS`
 
-_EVERY: tuple[Reading, ...] = (
-    Pose(), Position(), Height(), Distance(), Closure(), Between(), RelativeDistance(),
-    Orientation(), Tilt(), Angle(), Touch(), TouchDistance(),
-    Camera(),
-)  # fmt: skip
-KINDS: dict[Kind, Reading] = {cast(Kind, each.name): each for each in _EVERY}
+_CLASSES = (each for each in vars(exported).values() if isinstance(each, type))
+_EVERY = [each() for each in _CLASSES if issubclass(each, Reading) and each is not Reading]
+KINDS: dict[Kind, Reading] = {each.name: each for each in sorted(_EVERY, key=lambda e: e.name)}
 
 
 class _Headings(NamedTuple):
@@ -49,14 +38,42 @@ def require_own_columns(kinds: Iterable[Reading]) -> None:
     """
     every = tuple(kinds)
     for kind in every:
-        headings = dict.fromkeys((*(name for name, _ in kind.components), *kind.labels))
-        table = cast(Table, _Headings(headings))
-        mine = [each.name for each in every if each.found_in(table)]
-        if len(mine) > 1:
-            raise TypeError(
-                f"kinds {' and '.join(mine)} both read the columns {', '.join(headings)}: names"
-                " of components, or found_in of their classes, have to tell files apart"
-            )
+        _refuse_both(kind, _readers(kind, every))
+
+
+def require_read_back(kind: Reading, values: FloatArray, actuators: FloatArray) -> None:
+    """Refuse a kind of the user's own whose table would be read back as a kind of the package.
+
+    Raises
+    ------
+    TypeError
+        Such kinds, by their names.
+    """
+    if kind.name in KINDS:
+        return
+    for other in _readers(kind, KINDS.values()):
+        try:
+            other.of_rows(values, actuators, None)
+        except ArgumentError:  # it needs more: an error when the table is read
+            continue
+        _refuse_both(kind, [other, kind])
+
+
+def _readers(kind: Reading, every: Iterable[Reading]) -> list[Reading]:
+    """The kinds that would read a table with the columns of one of them."""
+    headings = dict.fromkeys((*(name for name, _ in kind.components), *kind.labels))
+    table = cast(Table, _Headings(headings))
+    return [each for each in every if each.found_in(table)]
+
+
+def _refuse_both(kind: Reading, readers: Sequence[Reading]) -> None:
+    if len(readers) > 1:
+        columns = dict.fromkeys((*(name for name, _ in kind.components), *kind.labels))
+        raise ArgumentTypeError(
+            f"kinds {' and '.join(each.name for each in readers)} both read the columns"
+            f" {', '.join(columns)}: names of components, or found_in of their classes, have to"
+            " tell files apart"
+        )
 
 
 require_own_columns(_EVERY)
@@ -145,13 +162,13 @@ def _require_fields(of: type[Reading]) -> None:
         )
 
 
-def stated(kind: Kind | Reading | str | None, instrument: Reading | None) -> Reading:
+def stated(kind: Kind | Reading | None, instrument: Reading | None) -> Reading:
     """The instrument that `kind` and `instrument` state."""
     own = None if instrument is None else as_reading(instrument, "instrument")
     if kind is None:
         return as_reading("position") if own is None else own
     if own is None or not isinstance(kind, str):
-        return as_reading(kind)  # type: ignore[arg-type]
+        return as_reading(kind)
     if kind != own.name:
         raise ArgumentError(
             f"kind: {kind!r} contradicts the instrument, {type(own).__name__}; an object, such as"

@@ -25,7 +25,7 @@ _TEXTS = (
     "number", "customer", "machine", "manufacturer", "serial", "operator", "place", "method",
     "remarks",
 )  # fmt: skip
-_INSTRUMENT = ("name", "serial", "certificate", "expanded", "factor")
+_INSTRUMENT = ("name", "serial", "certificate", "expanded", "factor", "noise")
 _TEMPERATURE = ("mean", "uncertainty", "expansion", "expansion_uncertainty")
 _NOWHERE = np.empty(0)
 _ROUNDED = 0.1  # K, to which temperatures are stated
@@ -44,6 +44,9 @@ class Statement:
         Name, serial and certificate of the instrument.
     expanded, factor : float
         Expanded uncertainty of a coordinate it reads, mm, and its coverage factor; NaN: not stated.
+    noise : float
+        Standard deviation of what it reads again at one place, mm, which is part of that; NaN: not
+        stated.
     temperature : float
         Mean of the machine during the measurement, °C; NaN: not stated.
     temperature_uncertainty : float
@@ -58,6 +61,7 @@ class Statement:
     instrument: dict[str, str] = field(default_factory=dict)
     expanded: float = float("nan")
     factor: float = 2.0
+    noise: float = float("nan")
     temperature: float = float("nan")
     temperature_uncertainty: float = 0.0
     expansion: float = float("nan")
@@ -91,6 +95,7 @@ def read(path: str | PathLike[str]) -> Statement:
         instrument={k: tool.text(k) if k in tool else "" for k in _INSTRUMENT[:3]},
         expanded=_positive(tool, "expanded", nan),
         factor=_positive(tool, "factor", 2.0),
+        noise=_positive(tool, "noise", nan),
         temperature=heat.number("mean", "1", nan),
         temperature_uncertainty=_positive(heat, "uncertainty", 0.0),
         expansion=heat.number("expansion", "1", nan),
@@ -199,15 +204,18 @@ def _same_heat(found: Identification, stated: Statement) -> None:
 def _shared_noise(found: Identification, stated: Statement) -> float:
     """Return noise that residuals and U of the instrument both hold, mm.
 
-    As good as `sigma` says, and no more than the instrument's own uncertainty; 0 where one of them
-    is not stated.
+    As stated, or else as good as `sigma` says, and no more than the instrument's own uncertainty; 0
+    where nothing is stated of one of them.
     """
+    whole = stated.expanded / stated.factor
+    if np.isfinite(stated.noise) and np.isfinite(whole):
+        return min(stated.noise, whole)
     lengths = [each for each in found.fit.equations.table.sets if "mm" in each.units]
     variances = [stated_variances(each) for each in lengths]
     known = [np.mean(each) for each in variances if each is not None]
-    if not known or len(known) < len(variances) or not np.isfinite(stated.expanded):
+    if not known or len(known) < len(variances) or not np.isfinite(whole):
         return 0.0
-    return min(float(np.sqrt(np.mean(known))), stated.expanded / stated.factor)
+    return min(float(np.sqrt(np.mean(known))), whole)
 
 
 def _beyond(scatter: float, noise: float) -> float:
@@ -215,10 +223,12 @@ def _beyond(scatter: float, noise: float) -> float:
     return float(np.sqrt(max(scatter**2 - noise**2, 0.0)))
 
 
-def _of_noise(noise: float) -> str:
-    """Say whether a scatter holds the noise of the instrument."""
+def _of_noise(noise: float, stated: Statement) -> str:
+    """Say whether a scatter holds the noise of the instrument, which its U may hold as well."""
     if noise:
         return f"without the noise of the instrument, {noise:.3g} mm, which is part of its U"
+    if np.isfinite(stated.expanded) and np.isnan(stated.noise):
+        return "noise of the instrument included, though U holds it too: noise is not stated"
     return "noise of the instrument included"
 
 
@@ -233,7 +243,7 @@ def _misfit(found: Identification, stated: Statement) -> list[Contribution]:
                 "repeatability",
                 _beyond(found.repeatability, noise),
                 dof=split.pure_freedom,
-                remark=f"scatter of repeated poses, {_of_noise(noise)}",
+                remark=f"scatter of repeated poses, {_of_noise(noise, stated)}",
             ),
             Contribution(
                 "lack of fit",
@@ -251,8 +261,8 @@ def _misfit(found: Identification, stated: Statement) -> list[Contribution]:
             "repeatability and lack of fit",
             _beyond(float(np.sqrt(known.mean())), noise),
             dof=max(sure.fit.freedom, 0.0) or float("inf"),
-            remark=f"residuals, {_of_noise(noise)}; only repeated poses would tell repeatability"
-            " from lack of fit",
+            remark=f"residuals, {_of_noise(noise, stated)}; only repeated poses would tell"
+            " repeatability from lack of fit",
         )
     ]
 

@@ -102,7 +102,10 @@ def shifted(
     cluster = np.concatenate([c1, c2 + c1.max() + 1])
     common = column_basis(np.vstack([x1, x2]) @ basis)
     apart = data_alone(x1 @ basis, r1)[0] + data_alone(x2 @ basis, r2)[0]
-    raw = [np.vstack([np.zeros((len(r1), d.shape[1])), x2 @ d]) for d in candidates]
+    zero = np.zeros(len(r1))
+    raw = [  # column by column, so that those of a kind are to the last bit those alone
+        np.column_stack([np.concatenate([zero, x2 @ column]) for column in d.T]) for d in candidates
+    ]
     few = len(y) <= _FEW
     taken: list[_Taken] = []
     disagreement = None
@@ -142,7 +145,9 @@ def shifted(
         chance = min(1.0, best.chance * len(trials))
         trial = _Trial(best.candidate, best.drop, chance, best.basis)
         taken.append(_Taken(trial, also, rms, named))
-    return _together(taken, raw, np.vstack([x1, x2]) @ basis, y, cluster, few)
+    design = np.vstack([x1, x2]) @ basis
+    found = _together(taken, raw, design, y, cluster, few)
+    return found if few else _each_of_its_kind(found, raw, design, y, cluster)
 
 
 def _trial(
@@ -227,6 +232,73 @@ def _together(
         size = solution[mine], deviation[mine]
         found.append(Shift(trial.candidate, *size, trial.chance, each.also, each.rms))
     return found
+
+
+def _each_of_its_kind(
+    found: list[Shift],
+    raw: Sequence[FloatArray],
+    design: FloatArray,
+    y: FloatArray,
+    cluster: IntArray,
+) -> list[Shift]:
+    """Add the other numbers of a kind that shifted, where one of them is named.
+
+    The search ends at a share of the disagreement; once a kind has shifted, its others are tested
+    with all of the kind free. So are all of them where a shift of all alike was found beside that
+    of one, whose sizes are then parts of what each shifted by. Nothing changes where the numbers of
+    the kind cannot be told apart.
+    """
+    single = {each.tobytes(): j for j, each in enumerate(raw) if each.shape[1] == 1}
+    for kind in (each for each in raw if each.shape[1] > 1):
+        own = [j for column in kind.T if (j := single.get(column.tobytes())) is not None]
+        first = next((each for each in found if each.candidate in own), None)
+        if first is None or len(own) < kind.shape[1] or not _left(kind, design) > _TOLD:
+            continue
+        solution, deviation, freedom = _estimated(np.hstack([design, kind]), y, cluster)
+        n = design.shape[1]
+        chances = [
+            min(1.0, len(own) * f_tail(float((solution[k] / deviation[k]) ** 2), 1, freedom[k]))
+            for k in range(n, len(solution))
+        ]
+        together = [
+            each
+            for each in found
+            if each.candidate not in own and _is_of_all(raw[each.candidate], kind)
+        ]
+        kept = [each for each in found if each not in together]
+        if together:
+            kept = [each for each in kept if each.candidate not in own]
+        there = {each.candidate for each in kept}
+        others = [
+            Shift(j, solution[[n + k]], deviation[[n + k]], chances[k], (), first.rms)
+            for k, j in enumerate(own)
+            if j not in there and chances[k] < _CHANCE
+        ]
+        others.sort(key=lambda each: -abs(float(each.size[0])))
+        found = [*others, *kept] if together else [*kept, *others]
+    return found
+
+
+def _is_of_all(candidate: FloatArray, kind: FloatArray) -> bool:
+    """Return whether a candidate is the shift of all numbers of a kind, alike or each its own."""
+    whole = kind.sum(axis=1, keepdims=True) if candidate.shape[1] == 1 else kind
+    if candidate.shape != whole.shape:
+        return False
+    return bool(np.linalg.norm(candidate - whole) <= LEFT * np.linalg.norm(whole))
+
+
+def _estimated(
+    whole: FloatArray, y: FloatArray, cluster: IntArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Least squares: sizes, their deviations by cluster, and the degrees of freedom of these."""
+    _, singular, rows = svd(triangle(whole))
+    keep = singular > ROUNDING * singular[0]
+    half = rows[keep].T / singular[keep]
+    basis = whole @ half
+    solution = half @ (basis.T @ y)
+    sandwich = Sandwich(_fit(basis, y - basis @ (basis.T @ y), cluster))
+    variance = np.maximum(np.diagonal(half @ sandwich.data @ half.T), 0.0)
+    return solution, np.sqrt(variance), sandwich.freedom(half)
 
 
 def _beside(

@@ -122,13 +122,15 @@ def _charuco(board: Board) -> Finder:
     made = charuco_board(board)
     detector = opencv().aruco.CharucoDetector(made)
     own = set(np.ravel(made.getIds()).tolist())
+    square, marker = board.sizes[:2]
+    share = min(_SHARE, 0.5 * (1.0 - marker / square))  # beyond it are the markers' own edges
 
     def found(grey: Any) -> Seen:
         corners, ids, _, markers = detector.detectBoard(grey)
         strange = 0 if markers is None else len(set(np.ravel(markers).tolist()) - own)
         if ids is None or not len(ids):
             return NOTHING._replace(strange=strange)
-        pixel = _refined(grey, corners.reshape(-1, 2))
+        pixel = _refined(grey, corners.reshape(-1, 2), share)
         return Seen(np.ravel(ids).astype(np.int64), pixel, strange)
 
     return found
@@ -215,12 +217,15 @@ def _large_dot_low(grid: FloatArray, size: FloatArray) -> FloatArray:
     return turned[best][0] if larger[best] > _LARGER else grid
 
 
-def _refined(grey: Any, pixel: Any) -> FloatArray:
-    """Corners between squares to hundredths of a pixel, in a window that holds no other one."""
+def _refined(grey: Any, pixel: Any, share: float = _SHARE) -> FloatArray:
+    """Corners between squares to hundredths of a pixel, in a window that holds nothing else.
+
+    The window reaches `share` of the way to the next corner.
+    """
     cv2 = opencv()
     away = np.linalg.norm(pixel[:, None] - pixel[None], axis=2)
     np.fill_diagonal(away, np.inf)
-    window = int(np.clip(_SHARE * away.min(initial=np.inf), 2, _WINDOW))
+    window = int(np.clip(np.rint(share * away.min(initial=np.inf)), 2, _WINDOW))
     corners = pixel.reshape(-1, 1, 2).astype(np.float32)
     until = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 50, 1e-4)
     cv2.cornerSubPix(grey, corners, (window, window), (-1, -1), until)

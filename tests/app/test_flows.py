@@ -49,7 +49,7 @@ def click_arrow(page: Any, key: str) -> None:
 
 def commands(page: Any, step: str) -> list[list[str]]:
     page.get_by_role("button", name=step, exact=True).click()
-    page.locator(f"main.{page.evaluate('workbench.step')}").wait_for()
+    page.locator(f"main.{page.evaluate('workbench.step')}[aria-busy=false]").wait_for()
     return [
         shlex.split(line) for line in page.locator("#terminal pre").inner_text().splitlines()[1:]
     ]
@@ -211,7 +211,7 @@ def test_two_tabs_show_one_project(tmp_path: Path) -> None:
         other.goto(served.url)
         other.locator("body[data-ready]").wait_for(state="attached")
         page.get_by_role("button", name="hexapod", exact=True).click()
-        other.locator("h2", has_text="hexapod").first.wait_for(timeout=5000)
+        other.locator("h2", has_text="hexapod").first.wait_for()  # how soon: bench_app
 
 
 def test_what_others_wrote_is_shown_as_text(tmp_path: Path) -> None:

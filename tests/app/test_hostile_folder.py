@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import socket
 import subprocess
 from pathlib import Path
@@ -203,3 +204,31 @@ def test_a_reload_and_the_way_back_lead_to_screens(tmp_path: Path) -> None:
             page.locator("main.plan h1").wait_for()
             assert page.evaluate("document.activeElement.id") == "main"
             assert state(served)["version"] == 2  # to look around changes nothing
+
+
+def test_a_folder_that_is_gone_is_told_and_goes_on_where_it_comes_back(tmp_path: Path) -> None:
+    folder, away = tmp_path / "project", tmp_path / "away"
+    folder.mkdir()
+    measured("hexapod", 20, seed=1).write(folder / "m.csv")
+    asked: tuple[tuple[str, str, bytes | None], ...] = (
+        ("GET", "/api/state", None),
+        ("POST", "/api/state", b'{"state":{"pkmcal-project":1},"version":2}'),
+        ("POST", "/api/undo", b'{"version":2}'),
+        ("PUT", "/api/file/a.csv", b"x"),
+        ("POST", "/api/run/fit", b"{}"),
+        ("POST", "/api/run/machine", b"{}"),
+        ("POST", "/api/live", b'{"machine":"person","out":"a.csv","plan":{"kind":"height"}}'),
+    )
+    with browser.served(folder) as served:
+        take(served, Project(Calibration("hexapod", ("m.csv",))))
+        folder.rename(away)
+        for method, path, body in asked:
+            status, _, answer = ask(served, method, path, body)
+            assert status != 500, path
+            words = json.loads(answer.splitlines()[-1])
+            assert set(words) & {"error", "trouble"}, path
+            assert str(folder) in str(words) or "could not be kept" in str(words), path
+        away.rename(folder)
+        assert "trouble" not in state(served)
+        assert done(served, "fit")["verdict"]
+        assert state(served)["state"]["measured"] == {"files": ["m.csv"]}

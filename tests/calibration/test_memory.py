@@ -9,7 +9,7 @@ import pytest
 
 import pkmcal as pk
 
-_BESIDE = 1200.0  # bytes a row that are held at most beside a Jacobian
+_BESIDE = 900.0  # bytes a row that are held at most beside a Jacobian
 _ROWS = 60_000  # more than any lot
 
 
@@ -39,6 +39,6 @@ def a_row(robot: pk.Robot, free: str | None) -> float:
 def test_one_jacobian_is_held_and_little_more(
     hexapod: pk.Robot, free: str | None, numbers: int
 ) -> None:
-    """A million rows take 1.4 GB with 6 numbers, 2.2 GB with 42, and 0.2 GB for the rest."""
+    """At 60 000 rows 937 bytes are held with 6 numbers, and 1819 with 42; measurements aside."""
     assert pk.identify(hexapod, positions(hexapod, 1000), free).verdict.state  # imports
     assert a_row(hexapod, free) < 8.0 * 3 * numbers + _BESIDE

@@ -72,7 +72,8 @@ def test_a_reading_of_a_mistakes_name_undoes_it(
     paper: Robot, points: Measurements, words: str, change: Change
 ) -> None:
     wrong = dataclasses.replace(points, **change(points))
-    undone = dict(other_readings(wrong, paper.actuator_units))[words]
+    readings = other_readings(wrong, paper.actuator_units)
+    undone = {meant.words: other for meant, other in readings}[words]
     np.testing.assert_allclose(undone.actuators, points.actuators, rtol=1e-12)
     np.testing.assert_allclose(undone.values, points.values, rtol=1e-12)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -81,3 +82,43 @@ def minutes_of(text: str) -> list[float]:
             found.append(ways[0] / rates[0] if ways[0] else ways[1] / rates[1])
         at = new
     return found
+
+
+# Words that move axes, or change what coordinates mean, of the makers' lists: the G-code dictionary
+# of RepRapFirmware (docs.duet3d.com, 3.5) and the quick reference of LinuxCNC (2.9).
+MOVING = {
+    "reprap": """
+        G2 G3 G27 G28 G29 G30 G31 G32 G38.2 G38.3 G38.4 G38.5 G53 G55 G56 G57 G58 G59 G59.1 G59.2
+        G59.3 G61 G68 G80 G81 M0 M1 M23 M24 M25 M32 M92 M98 M99 M109 M121 M125 M206 M226 M290 M350
+        M375 M376 M401 M402 M425 M428 M501 M502 M556 M559 M560 M563 M569 M574 M579 M582 M584 M585
+        M594 M596 M600 M601 M606 M665 M666 M667 M668 M669 M673 M674 M675 M701 M702 M703 M851 M916
+        M957 M999
+    """,
+    "linuxcnc": """
+        G2 G3 G5 G5.1 G5.2 G5.3 G6 G6.1 G6.2 G6.3 G7 G10 G28 G30 G33 G33.1 G38.2 G38.3 G38.4 G38.5
+        G41 G41.1 G42 G42.1 G43 G43.1 G43.2 G52 G53 G55 G56 G57 G58 G59 G59.1 G59.2 G59.3 G70 G71
+        G71.1 G71.2 G72 G72.1 G72.2 G73 G74 G76 G81 G82 G83 G84 G85 G86 G87 G88 G89 G92 G92.3 M6
+        M72 M73 M98 M99 M100 M137 M199
+    """,
+}
+
+
+@pytest.mark.parametrize(("firmware", "words"), MOVING.items())
+def test_no_published_word_that_moves_axes_passes_as_harmless(
+    tmp_path: Path, firmware: str, words: str
+) -> None:
+    """Each is refused, or where the machine is then is unknown: all axes have to be stated."""
+    passed = []
+    for name in words.split():
+        for line in (name, f"{name} X1 Y1"):
+            text = f"G1 X0 Y0 Z50 F3000\n{line}\nG1 X3\n"
+            with suppress(pk.FileError):
+                compensated(text, tmp_path, firmware=firmware)
+                passed.append(line)
+    assert passed == []
+
+
+@pytest.mark.parametrize("firmware", ["grbl", "fluidnc"])
+def test_a_firmware_without_a_table_is_refused_by_name(tmp_path: Path, firmware: str) -> None:
+    with pytest.raises(pk.ArgumentError, match=f"firmware.*{firmware}"):
+        compensated("G1 X0 Y0 Z50 F3000\n", tmp_path, firmware=firmware)

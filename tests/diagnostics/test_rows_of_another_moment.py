@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
+from pkmcal.diagnostics.late import late
 
 from ..simulated import hexapod_poses, with_errors
 
@@ -365,3 +366,22 @@ def test_rows_are_tested_where_actuators_have_noise(
     data = pk.Measurements(q, read, kind, actuator_sigma=deviation)
     wanted = {"nothing": set(), "late": {"late-readings"}, "two machines": {"two-machines"}}
     assert wanted[wrong] == NEW & doubts(robot, data).keys()
+
+
+@pytest.mark.filterwarnings("ignore::pkmcal.CalibrationWarning")
+def test_a_share_of_many_ways_is_not_said() -> None:
+    """Where the machine's own derivatives say nothing of the way, a share of it is no number.
+
+    No position moves of a positioner whose axes meet in its tool: 1e27 ways were named.
+    """
+    positioner = pk.SerialArm([[0, 1, 0], [0, 0, 1]], np.zeros((2, 3)), np.eye(4))
+    rng = np.random.default_rng(5)
+    q = rng.uniform(-2, 2, (205, 2))
+    off = rng.normal(size=(2, 6)) * [0.3, 0.3, 0.3, 2e-3, 2e-3, 2e-3]
+    frame = pk.screw.exp(np.r_[rng.normal(size=3), rng.normal(size=3) * 500])
+    tool = pk.screw.exp(np.r_[rng.normal(size=3) * 0.3, rng.normal(size=3) * 100])
+    seen = pk.screw.to_pose(frame @ positioner.forward(q, off) @ tool)
+    seen += rng.normal(size=seen.shape) * [0.2, 0.2, 0.2, 3e-4, 3e-4, 3e-4]
+    found = pk.identify(positioner, measured(q, seen[:, :3]), unknown="frame")
+    said = late(found)
+    assert said is None or abs(said.share) <= 2.0

@@ -149,7 +149,7 @@ def test_beyond_the_largest_tension_and_out_of_reach(tmp_path: Path) -> None:
 def test_what_has_no_cables_is_refused() -> None:
     with pytest.raises(pk.ArgumentError, match="hexapod has no cables"):
         pk.tensions(pk.load("hexapod"), [0, 0, 850, 0, 0, 0])
-    with pytest.raises(pk.ArgumentError, match="chains of joints, no cables"):
+    with pytest.raises(pk.ArgumentError, match="has no cables"):
         pk.tensions(pk.load("tricept"), [0, 0, 1000, 0, 0, 0])
     sled = pk.load("examples/belts/robot.toml")
     for more, said in (

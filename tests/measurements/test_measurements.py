@@ -140,7 +140,7 @@ def test_targets_without_places_are_an_error_only_when_places_are_asked_for() ->
 
 
 BAD: list[tuple[dict[str, Any], type[Exception], str]] = [
-    ({"kind": "points"}, ValueError, "kind must be one of pose, position.*'points'"),
+    ({"kind": "points"}, ValueError, "kind must be one of angle, between.*'points'"),
     ({"actuators": 1}, ValueError, r"actuators must have shape \(N, n\), or \(n,\).*\(\)"),
     (
         {"actuators": [1, 2]},

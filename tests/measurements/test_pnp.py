@@ -117,11 +117,50 @@ def test_a_stand_in_of_the_same_size_weighs_as_the_board_does() -> None:
     _, measured = pictures(0, 8)
     poses = of_pictures(measured)
     board = pk.from_pnp(poses, FOCAL, BOARD).sigma
-    size = pk.from_pnp(poses, FOCAL, (180.0, 80.0)).sigma
+    size = pk.from_pnp(poses, FOCAL, (180.0, 80.0, 90.0, 40.0)).sigma
     assert board is not None and size is not None
     ratio = np.sqrt(np.linalg.det(size) / np.linalg.det(board)) ** (1 / 6)
     np.testing.assert_allclose(ratio, ratio[0], rtol=0.3)
     assert 1.0 < ratio[0] < 2.0  # it has half as many corners
+
+
+def test_the_middle_of_a_stand_in_counts_and_is_asked_for_where_nothing_tells_it() -> None:
+    """A camera beside the machine is pointed at no point of the board: it says so."""
+    true, measured = pictures(2)
+    poses = of_pictures(measured)
+    told = pk.from_pnp(poses, FOCAL, (180.0, 80.0, 90.0, 40.0), noise=NOISE)
+    with pytest.warns(pk.CalibrationWarning, match="where its middle is nobody knows"):
+        guessed = pk.from_pnp(poses, FOCAL, (180.0, 80.0), noise=NOISE)
+    several = [
+        fitted(each, **UNKNOWN)
+        for each in (told, guessed, pk.from_pnp(poses, FOCAL, BOARD, noise=NOISE))
+    ]
+    known, elsewhere, board = (off(each, true) for each in several)
+    assert known < 1.2 * board < 0.8 * elsewhere
+    assert "measuring-order" not in {each.check for each in several[0].verdict.said}
+
+
+def test_a_camera_that_is_pointed_at_the_board_tells_its_middle() -> None:
+    """From all around: the lines of sight meet where the camera looks."""
+    at = np.array([90.0, 40.0, 0.0])
+    motions = []
+    for turn in np.linspace(0.0, 6.0, 9):
+        eye = at + np.array(
+            [200 * np.cos(turn), 150 * np.sin(turn), -500.0]
+        )  # z of a board is into it
+        ahead = (at - eye) / np.linalg.norm(at - eye)
+        right = np.cross([0.0, 1.0, 0.0], ahead)
+        right /= np.linalg.norm(right)
+        camera = np.eye(4)
+        camera[:3, :3], camera[:3, 3] = np.array([right, np.cross(ahead, right), ahead]).T, eye
+        motions.append(np.linalg.inv(camera))
+    poses = pk.Measurements(np.zeros((9, 6)), pk.screw.to_pose(np.array(motions)), "pose")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", pk.CalibrationWarning)
+        guessed = pk.from_pnp(poses, FOCAL, (180.0, 80.0)).sigma
+    told = pk.from_pnp(poses, FOCAL, (180.0, 80.0, *at[:2])).sigma
+    assert guessed is not None and told is not None
+    np.testing.assert_allclose(guessed, told, rtol=1e-6, atol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -155,8 +194,16 @@ def test_a_table_of_poses_is_calibrated_by_one_command(
     poses = of_pictures(measured)
     poses.write(tmp_path / "pnp.csv")
     command = ("calibrate", "hexapod", tmp_path / "pnp.csv", "--free", ",".join(FREE))
-    result = run(*command, "--datum", "auto", "--from-pnp", f"f={FOCAL:g},board=180x80")
+    result = run(
+        *command, "--datum", "auto", "--from-pnp", f"f={FOCAL:g},board=180x80,middle=90x40"
+    )
     assert result.exit_code == 0, result.output
     assert "chi²/dof 1.0" in result.stdout and "tool.alpha" in result.stdout
-    for text in ("f=0,board=10x10", "board=10x10", "f=100,board=10", "f=1,board=1x1,size=3"):
+    for text in (
+        "f=0,board=10x10",
+        "board=10x10",
+        "f=100,board=10",
+        "f=1,board=1x1,size=3",
+        "f=1,board=1x1,middle=3",
+    ):
         assert run(*command, "--from-pnp", text).exit_code == 2

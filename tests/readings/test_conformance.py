@@ -16,7 +16,7 @@ from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.free_parameters import parameters
 from pkmcal.estimation.parameters import Asked
 from pkmcal.estimation.starts import with_starts
-from pkmcal.readings import At, Predicted, Start, always
+from pkmcal.readings import At, Height, Position, Predicted, Reading, Start, always
 from pkmcal.readings.registry import KINDS, require_own_columns
 
 from ..simulated import with_errors
@@ -311,3 +311,45 @@ def test_two_kinds_that_would_read_the_same_columns_are_refused() -> None:
     with pytest.raises(TypeError, match="loop and other both read the columns length, loop"):
         require_own_columns((*KINDS.values(), loop, other))
     require_own_columns((*KINDS.values(), loop))
+
+
+def test_a_kind_whose_files_would_be_taken_for_another_kind_is_not_written(tmp_path: Path) -> None:
+    """Read back without it, its z would be a height, and the fit wrong without a word."""
+    own = type("Doubled", (Height,), {"name": "doubled"})()
+    measured = pk.Measurements(np.ones((3, 6)), np.ones(3), own)
+    with pytest.raises(TypeError, match="height and doubled both read the columns z: names"):
+        measured.write(tmp_path / "z.csv")
+    assert not (tmp_path / "z.csv").exists()
+
+
+def _failing(at: At, zero: Any, failure: str) -> Predicted:
+    seen = Position().predict(at)
+    values, by_twist = seen.values[:, 2:], seen.by_twist[:, 2:]
+    if failure == "no by_twist":
+        return Predicted(values)  # type: ignore[call-arg]
+    return Predicted({"zero": values}["zerro"], by_twist)
+
+
+@pytest.mark.parametrize(
+    "failure, said",
+    [
+        ("no by_twist", r"TypeError: .* 'by_twist'; it is given at.* has to return Predicted\("),
+        ("a key", r"KeyError: 'zerro'; it is given at, zero \(what its methods arguments"),
+    ],
+)
+def test_a_predict_that_fails_is_named_with_what_it_is_given(failure: str, said: str) -> None:
+    """Simulated and fitted: the class, what went wrong in it, and what it has to return."""
+    members = {
+        "name": "sunk",
+        "components": (("sunk", "mm"),),
+        "predict": lambda self, at, zero=0.0, **numbers: _failing(at, zero, failure),
+        "arguments": lambda self, m: {"zero": np.zeros(len(m))},
+    }
+    own = dataclasses.dataclass(frozen=True, eq=False)(type("Sunk", (Reading,), members))()
+    robot = pk.load("hexapod")
+    q = robot.inverse(pk.sample_poses(robot, 12, seed=1))
+    message = f"^kind: predict of the class Sunk failed with {said}"
+    with pytest.raises(pk.ArgumentTypeError, match=message):
+        pk.VirtualMachine(robot).measure(q, own)
+    with pytest.raises(pk.ArgumentTypeError, match=message.split(", zero")[0]):
+        pk.identify(robot, pk.Measurements(q, np.ones(12), own), "offset*")

@@ -22,7 +22,7 @@ def measured() -> pk.Measurements:
     )  # fmt: skip
     at, seeing = camera.seeing(robot.inverse(pk.sample_poses(robot, 16, seed=0, share=0.3)), BOARD)
     seen = pk.VirtualMachine(robot, 0.05).measure(at, seeing)
-    return replace(seen, actuator_sigma=0.0)
+    return replace(seen, actuator_sigma=np.zeros(6))
 
 
 def fitted(rows: pk.Measurements, held: pk.Measurements) -> pk.Identification:

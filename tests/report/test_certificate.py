@@ -107,13 +107,15 @@ def test_the_expanded_uncertainty_holds_the_errors_of_new_arrivals(repeats: int)
     assert np.mean(within) == pytest.approx(np.mean(stated_coverage), abs=0.04)
 
 
-def budget_of(sigma: float | None, expanded: float) -> dict[str, float]:
+def budget_of(
+    sigma: float | None, expanded: float, noise: float = float("nan")
+) -> dict[str, float]:
     """Shares of a calibration whose readings scatter by 0.01 mm, of which `sigma` is stated."""
     robot, rng = pk.load("hexapod"), np.random.default_rng(4)
     q = np.repeat(robot.inverse(workspaces.poses("hexapod", 12, 4)), 5, axis=0)
     values = robot.forward(q).pose[:, :3] + rng.normal(0, NOISE, (len(q), 3))
     found = pk.identify(robot, pk.Measurements(q, values, sigma=sigma), free="offset*")
-    stated = certificate.Statement(expanded=expanded, factor=2.0)
+    stated = certificate.Statement(expanded=expanded, factor=2.0, noise=noise)
     made = certificate.budget(found, stated, np.empty(0))
     return {line.source: line.share for line in made.contributions} | {"R": found.repeatability}
 
@@ -129,6 +131,16 @@ def test_noise_of_the_instrument_is_in_the_budget_once() -> None:
     assert half["repeatability"] == pytest.approx(np.sqrt(half["R"] ** 2 - (NOISE / 2) ** 2))
     for other in (budget_of(None, 4 * NOISE), budget_of(NOISE, np.nan)):  # how much is not known
         assert other["repeatability"] == other["R"]
+
+
+def test_noise_that_the_certificate_states_is_in_the_budget_once(tmp_path: Path) -> None:
+    """Measurements need not state a sigma; no more than U of the instrument is taken out."""
+    (tmp_path / "c.toml").write_text("[instrument]\nexpanded = 0.04\nnoise = 0.006\n", "utf-8")
+    assert certificate.read(tmp_path / "c.toml").noise == 0.006
+    once = budget_of(None, 4 * NOISE, 0.6 * NOISE)
+    assert once["repeatability"] == pytest.approx(np.sqrt(once["R"] ** 2 - (0.6 * NOISE) ** 2))
+    whole = budget_of(None, NOISE, 3 * NOISE)
+    assert whole["repeatability"] == pytest.approx(np.sqrt(whole["R"] ** 2 - (NOISE / 2) ** 2))
 
 
 def test_u_is_stated_over_the_measured_region_first(folder: Path, found: pk.Identification) -> None:

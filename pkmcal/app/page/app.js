@@ -1,6 +1,6 @@
 // The window: five screens over one project that the server keeps, and files that are given to it.
 import * as server from './transport.js'
-import { $, STEPS, app, attempt, frame, go, made, refresh, said, trouble, work } from './frame.js'
+import { $, STEPS, app, attempt, frame, go, made, refresh, trouble, work } from './frame.js'
 
 // each screen is fetched when it is first shown
 for (const { dataset: { step } } of STEPS) app.screens[step] = async main => (await import(`./${step}.js`))[step](main)
@@ -82,6 +82,12 @@ async function settled(changed) {
   if (failed) throw failed
   if (late) trouble('Another tab changed the project. This one now shows it as it is: do it again if you still want to.')
   return !late
+}
+
+// What is said of files that were given.
+export function said(lines) {
+  $('said').replaceChildren(...lines.filter(Boolean).map(text => made('p', null, { text })))
+  $('said').hidden = !$('said').children.length
 }
 
 // Take files into the project, whatever they are and wherever they were dropped.

@@ -4,6 +4,7 @@ import * as server from './transport.js'
 export const STEPS = [...document.querySelectorAll('#steps button')] // painted before anything is asked
 export const app = { step: 'machine', project: null, screens: {}, show: null, picture: null }
 export const $ = id => document.getElementById(id)
+const main = $('main')
 
 export function made(tag, parent, settings = {}, ...children) {
   const element = document.createElement(tag)
@@ -44,9 +45,7 @@ export function tick(parent, text, checked, changed) {
   return box
 }
 
-export function trouble(text) {
-  Object.assign($('trouble'), { hidden: !text, textContent: text ?? '' })
-}
+export const trouble = text => Object.assign($('trouble'), { hidden: !text, textContent: text ?? '' })
 
 // Whatever fails says why, and everything else stays as it was.
 export async function attempt(what) {
@@ -115,7 +114,7 @@ export function again(parent, draw) {
   draw()
   parent.querySelectorAll('.wide').forEach((one, k) => { one.scrollTop = tops[k] ?? 0 })
   if (!at) return
-  const now = of(key)[place] ?? of(key)[0] ?? parent.querySelector('button, input, select') ?? $('main')
+  const now = of(key)[place] ?? of(key)[0] ?? parent.querySelector('button, input, select') ?? main
   if (typed !== null && keyOf(now) === key) now.value = typed
   now.focus({ preventScroll: true })
 }
@@ -147,22 +146,27 @@ let turn = 0, shown = Promise.resolve(), asked = null, building = null
 // Show a screen; the browser's way back leads to the one before, and a reload shows it again.
 export async function go(step, focus = true, keep = false) {
   if (!ready[step](app.project)) step = 'machine' // as after undo
-  if (step !== app.step) said([])
+  if (step !== app.step) $('said').hidden = true
   if (!keep && `#${step}` !== location.hash) history.pushState(null, '', `#${step}`)
   leave()
   Object.assign(app, { step, show: null })
   app.picture?.machine?.dispose?.()
   app.picture = null
   frame()
-  const main = $('main'), screen = made('div', null)
+  const screen = made('div', null)
   main.replaceChildren(screen)
   main.className = step
   if (focus) main.focus({ preventScroll: true })
   const mine = building = attempt(async () => {
     const show = await app.screens[step](screen) // what stands there whatever the project is
-    if (screen.isConnected) await showing(app.show = show)
-  }).finally(() => { if (building === mine) building = null })
+    if (!screen.isConnected) return
+    app.show = show
+    await showing()
+  })
   await mine
+  if (building !== mine) return
+  building = null
+  if (!app.show) main.ariaBusy = false // it could not be fetched
 }
 
 // Show the project as it is now; the screen stays, unless it has nothing to do any more.
@@ -175,24 +179,21 @@ export async function refresh() {
 }
 
 // A screen is drawn once at a time, and last of what was asked last: what is under way is left.
-function showing(show = app.show) {
+function showing() {
   const mine = leave()
   shown = shown.then(async () => {
     if (mine !== turn) return
     const ask = (operation, words, given) => work(operation, words, given, asked = {})
-    const done = await attempt(() => show(ask).then(() => true))
-    if (mine === turn) $('main').toggleAttribute('data-before', !done) // what stands there is older
+    const done = await attempt(() => app.show(ask).then(() => true))
+    if (mine !== turn) return
+    main.toggleAttribute('data-before', !done) // what stands there is older
+    main.ariaBusy = false
   })
   return shown
 }
 
 function leave() {
   if (running.has(asked)) asked.end({ left: true })
+  main.ariaBusy = true
   return ++turn
-}
-
-// What is said of files that were given.
-export function said(lines) {
-  $('said').replaceChildren(...lines.filter(Boolean).map(text => made('p', null, { text })))
-  $('said').hidden = !$('said').children.length
 }

@@ -1,6 +1,6 @@
 // What is taken away: the changed configuration, the calibrated machine, the report.
-import { change } from './app.js'
-import { again, app, attempt, button, choice, field, frame, made, refresh, said, work } from './frame.js'
+import { change, said } from './app.js'
+import { again, app, attempt, button, choice, field, frame, made, refresh, work } from './frame.js'
 import { save } from './transport.js'
 
 export async function out(main) {
