@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -63,3 +65,47 @@ def test_rows_of_inverse_are_contiguous(name: str, laws: bool) -> None:
     poses = robot.home + np.zeros((4, 6))
     for q in (robot.inverse(poses), robot.inverse(poses.reshape(2, 2, 6))):
         assert q.flags.c_contiguous and np.isfinite(q).all()
+
+
+CALLS: dict[str, Callable[[pk.Robot, np.ndarray, np.ndarray], object]] = {
+    "home": lambda robot, q, poses: robot.home,
+    "forward": lambda robot, q, poses: robot.forward(q),
+    "inverse": lambda robot, q, poses: robot.inverse(poses),
+    "complete": lambda robot, q, poses: robot.complete(poses),
+    "violation": lambda robot, q, poses: robot.violation(poses),
+    "jacobian": lambda robot, q, poses: robot.jacobian(poses),
+    "forward_jacobian": lambda robot, q, poses: robot.forward_jacobian(poses),
+    "error_jacobian": lambda robot, q, poses: robot.error_jacobian(poses),
+    "feasible": lambda robot, q, poses: robot.feasible(poses),
+    "forward_all": lambda robot, q, poses: robot.forward_all(q[0]),
+}
+
+
+def arrays_of(result: object) -> dict[str, np.ndarray]:
+    """Arrays of a result by name, also those that are computed when asked for."""
+    if isinstance(result, np.ndarray):
+        return {"": result}
+    names = ["pose", "status", "iterations", "residual", "conditioning", "same_side", "ok"]
+    names += ["poses", "certified", "conditioning", "stroke", "base_cone", "platform_cone"]
+    found = {name: getattr(result, name, None) for name in names}
+    return {name: value for name, value in found.items() if isinstance(value, np.ndarray)}
+
+
+@pytest.mark.parametrize("call", CALLS)
+@pytest.mark.parametrize("name", ["hexapod", "3rps", "linear-delta-6"])
+def test_writing_to_what_a_call_returns_alters_nothing_else(name: str, call: str) -> None:
+    """Neither the caller's arrays, nor what any call returns then: `out=` needs such arrays."""
+    robot = pk.load(name)
+    poses = robot.complete(pk.sample_poses(robot, 5, seed=1))
+    q = robot.inverse(poses)
+    given = poses.copy(), q.copy()
+    before = {k: {n: a.copy() for n, a in arrays_of(f(robot, q, poses)).items()}
+              for k, f in CALLS.items()}  # fmt: skip
+    for array in arrays_of(CALLS[call](robot, q, poses)).values():
+        if array.flags.writeable:
+            array[...] = 77
+    np.testing.assert_array_equal(poses, given[0])
+    np.testing.assert_array_equal(q, given[1])
+    for other, function in CALLS.items():
+        for part, array in arrays_of(function(robot, q, poses)).items():
+            np.testing.assert_array_equal(array, before[other][part], f"{other} {part}")

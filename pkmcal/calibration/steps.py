@@ -213,12 +213,12 @@ def with_component_noise(fit: Fit) -> Fit:
 
 def compare(rows: Rows, fit: Fit, outliers: bool) -> tuple[Rows, HeldOut]:
     """Compare the points held out; with `outliers` without those that are off where few are."""
-    held = evaluate(rows.held, fit.estimator, fit.estimate, fit.uncertainty)
+    held = evaluate(rows.held, fit.estimator, fit.estimate, fit.uncertainty, fit.start.theta)
     odd = held.holdout_outliers
     if outliers and odd and not held.holdout_contradicts:
         names = row_names(held.holdout_data, odd)
         kept = held_without(rows.held, odd)
-        held = evaluate(kept, fit.estimator, fit.estimate, fit.uncertainty)
+        held = evaluate(kept, fit.estimator, fit.estimate, fit.uncertainty, fit.start.theta)
         if rows.drawn:
             rows = replace(rows, held=kept, dropped=tuple(sorted({*rows.dropped, *odd})))
         else:

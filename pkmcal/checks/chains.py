@@ -126,7 +126,8 @@ def axes_in_line(robot: Robot) -> Iterator[Finding]:
             "singular",
             (),
             f"home is singular: the actuators move the tool in {home} ways there, nearby in {near}",
-            "choose a home pose in which the wrist is bent; inverse() starts there",
+            "choose a home pose beside it, turned or moved by some degrees or mm; inverse() and"
+            " forward() start there",
         )
 
 

@@ -61,7 +61,7 @@ def _ratio(fit: Fit, rows: Sequence[int]) -> float:
     try:
         others = Equations.of(without(fit.equations.prediction.datasets, rows), fit.parameters)
         others = others.reweighted(fit.uncertainty.equations.whitening.deviations)
-        start = others.with_exact_actuators().at(fit.start.theta)
+        start = others.with_exact_actuators().at(fit.problem.start.theta)
         estimate = Estimator(*others.begin(start), "linear").solve()
     except ValueError:
         return float("nan")

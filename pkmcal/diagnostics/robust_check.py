@@ -70,7 +70,7 @@ def robust_check(fit: Fit) -> RobustCheck | None:
     )
     commanded = few.with_exact_actuators()
     try:
-        estimator = Estimator(*few.begin(commanded.at(fit.start.theta)), "cauchy")
+        estimator = Estimator(*few.begin(commanded.at(fit.problem.start.theta)), "cauchy")
         robust = estimator.solve()
     except ValueError:
         return None

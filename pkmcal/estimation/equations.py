@@ -20,6 +20,7 @@ from pkmcal.estimation.compression import compressed
 from pkmcal.estimation.elimination import Shares
 from pkmcal.estimation.evaluation import Cache, Evaluation
 from pkmcal.estimation.first_frames import aligned
+from pkmcal.estimation.first_unknowns import fitted_together
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.parameters import Parameters
 from pkmcal.estimation.pose_system import PoseSystem
@@ -304,6 +305,16 @@ class Equations:
         if parameters is self.parameters and np.array_equal(theta, evaluation.theta):
             return evaluation
         return self.with_parameters(parameters).at(theta, near=states)
+
+    def of_machine_alone(self, start: Evaluation, own: BoolArray | None = None) -> Evaluation:
+        """Evaluate with all that readings depend on where it fits the machine of `start` best.
+
+        What they then miss is the machine's. `own` (n,) are the parameters that may be changed.
+        """
+        if not start.ok:
+            return start
+        theta = fitted_together(self.prediction, start, self.mm, own)
+        return start if theta is start.theta else self.at(theta, near=start)
 
     def begin(self, start: Evaluation) -> tuple[Equations, Evaluation]:
         """The equations by the parameters of a start with exact actuators, evaluated there."""

@@ -79,10 +79,10 @@ class Fit:
     classes: IntArray | None = None
     rule: CovarianceRule = "auto"
 
-    @property
+    @cached_property
     def start(self) -> Evaluation:
-        """The equations at the nominal machine, an unknown frame aligned with the readings."""
-        return self.problem.start
+        """The equations at the nominal machine, all unknowns of the readings fitted to it."""
+        return self.problem.exact.of_machine_alone(self.problem.start)
 
     @cached_property
     def equations(self) -> Equations:

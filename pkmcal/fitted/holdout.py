@@ -142,12 +142,20 @@ def unfitted(
     estimator: Estimator,
     estimate: Estimate,
     uncertainty: Uncertainty,
+    nominal: FloatArray,
 ) -> tuple[Later, Equations, tuple[Evaluation, Evaluation], OwnNumbers | None]:
-    """Rows that were not fitted, their equations, and these before and after the calibration."""
+    """Rows that were not fitted, their equations, and these before and after the calibration.
+
+    `nominal` (n,) are the parameters before it.
+    """
     rows = later(estimator.equations.parameters, held)
     whole = rows.equations(estimator.equations)
-    before = whole.with_exact_actuators().start(rows.at(estimator.start.theta), rows.own)
+    exact = whole.with_exact_actuators()
+    before = exact.start(rows.at(nominal), rows.own)
     equations, after, own = compared(rows, whole, estimate, uncertainty, before.begun)
+    if rows.own.any():
+        laid = exact.with_parameters(before.parameters)
+        before = laid.of_machine_alone(before, rows.own)
     rows = replace(rows, parameters=equations.parameters)  # their own frames have been laid
     return rows, equations, (before, after), own
 
@@ -157,6 +165,7 @@ def evaluate(
     estimator: Estimator,
     estimate: Estimate,
     uncertainty: Uncertainty,
+    nominal: FloatArray,
 ) -> HeldOut:
     """Compare points that were not fitted, before and after the calibration.
 
@@ -166,10 +175,14 @@ def evaluate(
         With each, the fitted set whose noise it has.
     estimator, estimate, uncertainty : Estimator, Estimate, Uncertainty
         Of the fit.
+    nominal : ndarray (n,)
+        The parameters before it.
     """
     if not held:
         return HeldOut()
-    rows, equations, (before, after), own = unfitted(held, estimator, estimate, uncertainty)
+    rows, equations, (before, after), own = unfitted(
+        held, estimator, estimate, uncertainty, nominal
+    )
     named = labels(equations)
     seen = points(rows, equations, after, named, own, uncertainty)
     row, count = named.row, len(equations.table.rows)

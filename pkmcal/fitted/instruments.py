@@ -60,7 +60,9 @@ def parts_of(
     )
     for (use, odd), pairs in zip(kinds, (held, found.dropped_data), strict=True):
         if pairs:
-            _, equations, ends, _ = unfitted(pairs, fit.estimator, fit.estimate, fit.uncertainty)
+            _, equations, ends, _ = unfitted(
+                pairs, fit.estimator, fit.estimate, fit.uncertainty, fit.start.theta
+            )
             yield equations, *ends, use, odd
 
 
