@@ -46,8 +46,8 @@ CHECKS = (
         say=lambda found, seen: str(seen),
     ),
     Check(
-        name="moved-instrument", about="a camera, a board or another instrument was moved between"
-        " two poses, where these are scattered by actuators",
+        name="moved-instrument", about="a camera, a board or another instrument was moved"
+        " between two poses",
         levels=("doubt",), unless=("grave", "follows-loads"),
         run=lambda found: at_most_one(moved_instrument(found.fit)),
         level_of=lambda found, seen: "doubt" if seen.found else None,

@@ -129,8 +129,8 @@ def _weights(off: Misfits, limits: Sequence[float]) -> FloatArray:
     """Factor on each number (M,), with which squares of gross rows grow by their length alone."""
     found = [np.empty(0)]
     for each, limit in zip(off, limits, strict=True):
-        lengths = np.maximum(np.linalg.norm(each, axis=1), np.finfo(float).tiny)
-        found.append(np.repeat(np.sqrt(np.minimum(1.0, limit / lengths)), each.shape[1]))
+        lengths = np.maximum(np.linalg.norm(each, axis=1), max(limit, np.finfo(float).tiny))
+        found.append(np.repeat(np.sqrt(limit / lengths), each.shape[1]))
     return np.concatenate(found)
 
 

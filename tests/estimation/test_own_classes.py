@@ -198,10 +198,14 @@ def renamed(name: str, unit: str = "mm") -> type[Reading]:
 def test_components_named_as_others_are_read_back_by_their_kind(
     name: str, unit: str, tmp_path: Path
 ) -> None:
-    kind = renamed(name, unit)
+    """Nothing is written that would be read as another kind where `kind=` is not stated."""
+    kind, path = renamed(name, unit), tmp_path / "m.csv"
     measured = pk.VirtualMachine(ROBOT, noise=0.01, seed=1).measure(Q, kind())
-    measured.write(tmp_path / "m.csv")
-    again = pk.read_measurements(tmp_path / "m.csv", ROBOT, kind=kind())
+    with pytest.raises(pk.ArgumentTypeError, match=f"both read the columns {name}"):
+        measured.write(path)
+    replace(measured, instrument=renamed("off", unit)()).write(path)
+    path.write_text(path.read_text().replace("off", name))
+    again = pk.read_measurements(path, ROBOT, kind=kind())
     assert again.kind == "own" and again.notes == ()
     np.testing.assert_array_equal(again.values, measured.values)
 
