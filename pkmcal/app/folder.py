@@ -10,6 +10,7 @@ import contextlib
 import filecmp
 import json
 import shutil
+import stat
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -18,7 +19,7 @@ from typing import Any
 from pkmcal.app.aside import free_place
 from pkmcal.app.commands import OUTPUTS, PLAN, REPORT
 from pkmcal.app.names import safe_name
-from pkmcal.exceptions import ArgumentError
+from pkmcal.exceptions import ArgumentError, FileError
 from pkmcal.files.atomic import write_whole
 from pkmcal.jobs.machine import is_built_in
 from pkmcal.jobs.project import Project
@@ -35,6 +36,7 @@ OWN = frozenset({  # names that are pkmcal's; a user's file gets another
 })  # fmt: skip
 MOST_FILE, MOST_FOLDER = 100_000_000, 1_000_000_000  # bytes
 UPLOAD = ".upload-", ".part"  # around the name of a file that is being sent
+_MOST = 1_000_000  # bytes of a project file, as many as a request may state
 _UNDO = 100
 
 
@@ -87,7 +89,7 @@ class Folder:
 
     def _follow(self) -> bool:
         try:
-            content = (self.path / FILE).read_bytes()
+            content = _content(self.path / FILE)
         except FileNotFoundError:
             return False
         if content == self._content:
@@ -178,8 +180,12 @@ class Folder:
         """Return a file of the folder that may be taken away, or None."""
         if "\0" in path:
             return None
-        found = (self.path / path).resolve()
-        if not found.is_relative_to(self.path) or not found.is_file():
+        try:
+            found = (self.path / path).resolve()
+            there = found.is_relative_to(self.path) and found.is_file()
+        except (OSError, RuntimeError):  # a name that is too long, links in a circle
+            return None
+        if not there:
             return None
         hidden = any(part.startswith(".") for part in found.relative_to(self.path).parts)
         return None if hidden else found
@@ -214,11 +220,24 @@ class Folder:
         return path.is_file() and not path.name.startswith(".") and path.name != FILE
 
 
+def _content(file: Path) -> bytes:
+    """Read a project file, which a pipe or a device with its name would never end."""
+    found = file.stat()
+    if stat.S_ISREG(found.st_mode) and found.st_size > _MOST:
+        raise ArgumentError(f"{file}: {found.st_size} bytes are too many for a project file")
+    if not (stat.S_ISREG(found.st_mode) or stat.S_ISDIR(found.st_mode)):
+        raise ArgumentError(f"{file}: a pipe or a device is no project file")
+    return file.read_bytes()
+
+
 def _parsed(content: bytes, place: str) -> Project:
     """Parse a project file; what says where a mistake is takes the packages that compute."""
-    with contextlib.suppress(ValueError):
-        return Project.of_table(tomllib.loads(content.decode()))
-    return Project.of_text(content, place)
+    try:
+        with contextlib.suppress(ValueError):
+            return Project.of_table(tomllib.loads(content.decode()))
+        return Project.of_text(content, place)
+    except RecursionError:
+        raise FileError(f"{place}: its lists lie in one another too deeply") from None
 
 
 def _refuse_elsewhere(project: Project) -> None:

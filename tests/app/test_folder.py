@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
 
+import pkmcal as pk
 from pkmcal.app.claim import ClaimedError, claimed
 from pkmcal.app.folder import Folder
 
@@ -56,6 +58,26 @@ def test_a_mistake_that_somebody_makes_in_the_file_is_named_and_stays(tmp_path: 
     with pytest.raises(ValueError, match=r"line 7.*fre"):
         folder.change(DELTA, 2)
     assert file.read_text() == wrong and folder.project.calibration.robot == "hexapod"
+
+
+def test_a_project_file_that_is_none_is_refused_at_once(tmp_path: Path) -> None:
+    file = tmp_path / "project.toml"
+    for made, message in (
+        (lambda: os.mkfifo(file), "a pipe or a device"),
+        (lambda: file.symlink_to("/dev/zero"), "a pipe or a device"),
+        (lambda: file.write_text("# " + "x" * 2_000_000), "too many for a project file"),
+        (lambda: file.write_text("x = " + "[" * 100_000), "too deeply"),
+    ):
+        made()
+        with pytest.raises(pk.Error, match=message):
+            Folder(tmp_path)
+        file.unlink()
+
+
+def test_a_name_that_no_file_can_have_is_that_of_none(tmp_path: Path) -> None:
+    folder = Folder(tmp_path)
+    for name in ("x" * 5000, "a" * 200 + "/" + "b" * 5000, "a\0b"):
+        assert folder.written(name) is None
 
 
 @pytest.mark.parametrize("name", ["machine", "report", "plan", "new.cfg", "for_klipper.txt"])
