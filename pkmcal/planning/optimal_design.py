@@ -5,7 +5,8 @@ information about every combination of parameters: that of a choice is between 0
 
 An exchange ends in a local optimum, and of nearly equal candidates rounding would decide in which.
 So what differs by less than `TIED` is equal, of equals the first is taken, and the exchange
-starts more than once and keeps the best.
+starts more than once and keeps the best. Of many candidates it starts with what it found among a
+tenth of them.
 """
 
 from __future__ import annotations
@@ -17,9 +18,11 @@ from typing import Literal
 
 import numpy as np
 
-from pkmcal.arrays import TIED, BoolArray, FloatArray, IntArray, first_largest, lots
+from pkmcal.arrays import TIED, BoolArray, FloatArray, IntArray, first_largest
 from pkmcal.estimation.identifiability import decompose
 from pkmcal.exceptions import ArgumentError
+from pkmcal.planning.additions import gains, losses, times
+from pkmcal.planning.gain_bounds import Bounds, Screen
 from pkmcal.statistics.linear_fit import ROUNDING
 
 Criterion = Literal["prediction", "D", "A"]
@@ -27,9 +30,11 @@ Criterion = Literal["prediction", "D", "A"]
 CRITERIA: tuple[Criterion, ...] = ("prediction", "D", "A")
 
 _SHORTLIST = 1000  # candidates that help most, which exchanges are first sought among
+_MANY = 50_000  # candidates of a sort from which on a tenth of them comes first
 _RENEWED = 10  # members that grow on one shortlist
+_GOLDEN = (5.0**0.5 - 1.0) / 2.0  # whose multiples, modulo 1, have no period that rows may have
+_NEXT = 100  # candidates, best in place of a member that was tried, that enter the shortlist
 _TRIED = 12  # members that matter least, one of which must want to be exchanged
-_TOGETHER = 512  # candidates that are looked at at once, as many as caches hold
 _STARTS = (1e-2, 1.0, 1e-4)  # candidates' worth of information that growing begins with
 _ROUNDED = 1e-9  # share by which a predicted error may exceed the one that was asked for
 _OPEN = 1e-6  # of a combination that is left open: a share of a parameter that is none
@@ -80,16 +85,19 @@ class Design:
             )
         unit = self._unit = basis[:, :rank] / singular[:rank]
         self.unidentifiable = basis[:, rank:]
-        self._determinant = criterion == "D"
-        self._blocks, self._all = _times(blocks, unit), np.arange(len(blocks))
+        self._one = np.eye(rank) / len(blocks)  # a candidate's worth, alike in all directions
+        self._offer(times(blocks, unit))
         self._prior = (prior @ unit).T @ (prior @ unit)
         metric = unit.T @ unit  # of the scaled parameters
         self._ridge = metric / worst**2
-        aimed = _times(aims, unit).reshape(-1, rank)
+        aimed = times(aims, unit).reshape(-1, rank)
         self._errors = aimed.T @ aimed / len(aims)
-        self._cost = metric if criterion == "A" else self._errors
-        self._coarse = self._blocks.reshape(-1, rank).astype(np.float32)
-        self._lengths = np.sqrt(np.einsum("nij,nij->n", self._blocks, self._blocks))
+        self._cost = None if criterion == "D" else metric if criterion == "A" else self._errors
+
+    def _offer(self, blocks: FloatArray) -> None:
+        self._blocks, self._all = blocks, np.arange(len(blocks))
+        self._few = len(blocks) <= _SHORTLIST * int(self._sort.max() + 1)
+        self._screen = Screen(blocks[:0] if self._few else blocks)
 
     def predicted(self, chosen: IntArray) -> float:
         """Root mean square error (mm) at the aims if these candidates are measured."""
@@ -117,17 +125,22 @@ class Design:
         counts = np.bincount(self._sort[chosen], minlength=1)
         drawn = []
         for _ in range(draws):
-            order = random.permutation(len(self._blocks))
+            order = random.permutation(len(self._all))
             each = [order[self._sort[order] == s][:count] for s, count in enumerate(counts)]
             drawn.append(self.predicted(np.concatenate(each)))
         return float(np.median(drawn))
 
     def grown(self, *counts: int) -> IntArray:
         """The best candidates that exchanges find, in order: so many of each sort."""
+        if len(self._all) > _MANY * int(self._sort.max() + 1):
+            some = self._tenth()
+            first = some[self._among(some).grown(*counts)]
+            return self._exchanged(first.tolist(), self._lacking(first.tolist()))
         total = sum(counts)
         grown = [list(itertools.islice(self._growing(worth, counts), total)) for worth in _STARTS]
-        ridge = self._lacking(grown[0])
-        found = [self._settled(chosen, ridge) for chosen in grown]
+        ridge, found = self._lacking(grown[0]), []
+        for each in grown:
+            found.append(self._settled(each, ridge, self._shortlist(each, ridge)))
         costs = np.array([self._log_cost(np.sort(chosen), ridge) for chosen in found])
         return self._exchanged(found[first_largest(-costs, TIED)], ridge)
 
@@ -137,6 +150,11 @@ class Design:
         nothing = np.array([], dtype=np.intp)
         if self.predicted(nothing) <= error:
             return nothing
+        if not self._few:
+            some = self._tenth()
+            part = self._among(some)
+            if part.predicted(part._all) <= error:
+                return self._reduced(some[part.reaching(error)].tolist(), error)
         found = []
         for worth in _STARTS:
             growing, chosen = self._growing(worth), list[int]()
@@ -161,9 +179,9 @@ class Design:
 
     def best(self, allowed: BoolArray) -> int:
         """The candidate that helps most, of those that are allowed (N,)."""
-        gains = self._gains([], self._lacking([]), self._all)
-        gains[~allowed] = -np.inf
-        return first_largest(gains, TIED * gains.max())
+        found = self._gains([], self._lacking([]), self._blocks)
+        found[~allowed] = -np.inf
+        return first_largest(found, TIED * found.max())
 
     def exchanged_for(self, chosen: IntArray, member: int) -> FloatArray:
         """Return the criterion with each candidate (N,) in place of a member.
@@ -173,18 +191,14 @@ class Design:
         """
         others = chosen[chosen != member]
         ridge = self._lacking(chosen.tolist())
-        gains = self._gains(others.tolist(), ridge, self._all)
-        gains[self._sort != self._sort[member]] = -np.inf
+        gained = self._gains(others.tolist(), ridge, self._blocks)
+        gained[others] = -np.inf
+        gained[self._sort != self._sort[member]] = -np.inf
         cost = self._log_cost(others, ridge)
-        if self._determinant:
-            deviations: FloatArray = (cost - gains) / (2 * len(ridge))
+        if self._cost is None:
+            deviations: FloatArray = (cost - gained) / (2 * len(ridge))
             return deviations
-        return np.asarray(np.log(np.maximum(np.exp(cost) - gains, np.finfo(float).tiny)) / 2.0)
-
-    def _worth(self, candidates: float) -> FloatArray:
-        """Information of so many candidates, alike in all directions."""
-        worth: FloatArray = candidates / len(self._blocks) * np.eye(self._blocks.shape[2])
-        return worth
+        return np.asarray(np.log(np.maximum(np.exp(cost) - gained, np.finfo(float).tiny)) / 2.0)
 
     def _lacking(self, chosen: list[int]) -> FloatArray:
         """Return a stand-in for the information that a choice lacks.
@@ -194,23 +208,43 @@ class Design:
         """
         information = self._information(np.array(chosen, dtype=np.intp))
         if np.linalg.eigvalsh(information)[0] < _NOTHING:
-            return np.asarray(self._ridge + self._worth(min(_STARTS)))
+            return np.asarray(self._ridge + min(_STARTS) * self._one)
         return np.asarray(self._ridge)
+
+    def _tenth(self) -> IntArray:
+        """In order some of many candidates, spread evenly over those of each sort."""
+        some = []
+        for sort in range(int(self._sort.max()) + 1):
+            mine = np.flatnonzero(self._sort == sort)
+            count = max(len(mine) // 10, min(_SHORTLIST, len(mine)))
+            some.append(mine[np.argsort(np.arange(len(mine)) * _GOLDEN % 1.0)[:count]])
+        return np.sort(np.concatenate(some))
+
+    def _among(self, some: IntArray) -> Design:
+        """The same design, with some of the candidates alone."""
+        made = copy.copy(self)
+        made._sort = self._sort[some]
+        made._offer(self._blocks[some])
+        return made
 
     def _growing(self, worth: float, counts: Sequence[int] = ()) -> Iterator[int]:
         """Candidates one by one, always the one that helps most those that entered before.
 
         At most `counts` of each sort.
         """
-        ridge, chosen, among = self._ridge + self._worth(worth), list[int](), self._all
-        most = sum(counts) if counts else len(self._blocks)
+        ridge, chosen = self._ridge + worth * self._one, list[int]()
+        among, offered = self._all, self._blocks
+        most = sum(counts) if counts else len(self._all)
         while len(chosen) < most:
-            among = self._shortlist(chosen, ridge) if len(chosen) % _RENEWED == 0 else among
-            gains = self._gains(chosen, ridge, among)
+            if len(chosen) % _RENEWED == 0 and not self._few:
+                among = self._shortlist(chosen, ridge)
+                offered = self._blocks[among]
+            gained = self._gains(chosen, ridge, offered)
+            gained[np.isin(among, chosen)] = -np.inf
             if counts:
                 entered = np.bincount(self._sort[chosen], minlength=len(counts))
-                gains[(entered >= counts)[self._sort[among]]] = -np.inf
-            chosen.append(int(among[first_largest(gains, TIED * gains.max())]))
+                gained[(entered >= counts)[self._sort[among]]] = -np.inf
+            chosen.append(int(among[first_largest(gained, TIED * gained.max())]))
             yield chosen[-1]
 
     def _reduced(self, chosen: list[int], error: float) -> IntArray:
@@ -218,8 +252,8 @@ class Design:
         ridge = self._lacking(chosen)
         best = self._exchanged(chosen, ridge)
         while len(best) > 1:
-            least = self._least(best.tolist(), ridge)[0]
-            fewer = self._exchanged([j for j in best.tolist() if j != least], ridge)
+            least = self._least(best, ridge)[0]
+            fewer = self._exchanged(best[best != least].tolist(), ridge)
             if self.predicted(fewer) > error:
                 break
             best = fewer
@@ -228,148 +262,132 @@ class Design:
     def _exchanged(self, chosen: list[int], ridge: FloatArray) -> IntArray:
         """Members that matter least make room for the best of all, until none has to.
 
-        Exchanges with all candidates take time with their number: those on a shortlist come first.
+        Exchanges with all candidates take time with their number: those on a shortlist come first,
+        which what is best in place of members enters.
         """
-        exchanged = True
-        while exchanged:
-            chosen, exchanged = self._exchange(self._settled(chosen, ridge), ridge, self._all)
-        return np.sort(np.array(chosen, dtype=np.intp))
+        short = self._shortlist(chosen, ridge)
+        while True:
+            settled = self._settled(chosen, ridge, short)
+            if not self._few:
+                chosen, entering = self._exchange_with_all(settled, ridge)
+            if self._few or chosen == settled:
+                return np.sort(np.array(settled, dtype=np.intp))
+            short = np.union1d(short, [*chosen, *entering])
 
-    def _settled(self, chosen: list[int], ridge: FloatArray) -> list[int]:
-        """Settle the gains of candidates on a shortlist."""
-        short, exchanged = self._shortlist(chosen, ridge), True
+    def _settled(self, chosen: list[int], ridge: FloatArray, short: IntArray) -> list[int]:
+        """Exchange with candidates on a shortlist until none has to."""
+        offered, exchanged = self._blocks[short], True
         while exchanged:
-            chosen, exchanged = self._exchange(chosen, ridge, short)
+            exchanged = False
+            for i in self._least(np.array(chosen, dtype=np.intp), ridge):
+                others = [j for j in chosen if j != i]
+                gained = self._gains(others, ridge, offered)
+                best = self._better(i, others, short, gained)
+                if self._lower([*others, best], [*others, i], ridge):
+                    chosen, exchanged = [*others, best], True
+                    break
         return chosen
 
+    def _exchange_with_all(
+        self, chosen: list[int], ridge: FloatArray
+    ) -> tuple[list[int], IntArray]:
+        """Exchange one member for the best of all candidates, if that is an improvement.
+
+        Returned with the candidates that are best in place of each member that was tried.
+        """
+        bounds, entering = self._bounds(chosen, ridge), []
+        for i in self._least(np.array(chosen, dtype=np.intp), ridge):
+            others, member = [j for j in chosen if j != i], self._blocks[i]
+            information = self._information(np.array(others, dtype=np.intp)) + ridge
+            least = float(gains(member[None], information, self._cost)[0])
+            most = self._screen.most_without(bounds.most, member, information, self._cost)
+            most[i] = np.inf
+            some = np.flatnonzero(most >= least)
+            gained = gains(self._blocks[some], information, self._cost)
+            entering.append(some[_largest(gained, _NEXT)])
+            best = self._better(i, others, some, gained)
+            if self._lower([*others, best], [*others, i], ridge):
+                return [*others, best], np.concatenate(entering)
+        return chosen, np.concatenate(entering)
+
+    def _better(self, member: int, others: list[int], among: IntArray, gained: FloatArray) -> int:
+        """The best of some candidates beside the others; the member itself if it is one of them."""
+        least = (1.0 + TIED) * float(gained[np.searchsorted(among, member)])
+        gained[self._sort[among] != self._sort[member]] = -np.inf
+        gained[np.isin(among, others)] = -np.inf
+        most = float(gained.max())
+        best = first_largest(gained, TIED * most)
+        return int(among[best]) if most > least and gained[best] > least else member
+
+    def _lower(self, exchanged: list[int], chosen: list[int], ridge: FloatArray) -> bool:
+        """Whether an exchange makes the criterion less.
+
+        By the criterion itself: gains beside a choice that leaves much open are inaccurate, and of
+        exchanges that each gain by them there may be circles.
+        """
+        if exchanged == chosen:
+            return False
+        after, before = (
+            self._log_cost(np.array(each, dtype=np.intp), ridge) for each in (exchanged, chosen)
+        )
+        return after < before - TIED
+
     def _shortlist(self, chosen: list[int], ridge: FloatArray) -> IntArray:
-        """In order the members, and of each sort the candidates that add most to them."""
-        sizes = np.bincount(self._sort)
-        if len(self._all) <= _SHORTLIST * len(sizes):
+        """In order the members, and of each sort the candidates that add most; all of few."""
+        if self._few:
             return self._all
+        bounds, sizes = self._bounds(chosen, ridge), np.bincount(self._sort)
         short = np.zeros(len(self._all), dtype=bool)
         for sort, size in enumerate(sizes):
-            gains = self._largest(chosen, ridge, self._sort == sort, min(_SHORTLIST, size))
-            least = np.partition(gains, -min(_SHORTLIST, size))[-min(_SHORTLIST, size)]
-            short |= gains >= least - TIED * abs(least)  # all that are equal
+            allowed, count = self._sort == sort, min(_SHORTLIST, size)
+            allowed[chosen] = False
+            at_least = np.where(allowed, bounds.least, -np.inf)
+            floor = np.partition(at_least, -count)[-count] * (1.0 - 2.0 * TIED)
+            some = np.flatnonzero(allowed & (bounds.most >= floor))
+            gained = self._gains(chosen, ridge, self._blocks[some])
+            some = some[_largest(gained, count)]
+            short[some] = True
         short[chosen] = True
         return np.flatnonzero(short)
 
-    def _exchange(
-        self, chosen: list[int], ridge: FloatArray, among: IntArray
-    ) -> tuple[list[int], bool]:
-        """Exchange one member for the best of these candidates, if that is an improvement."""
-        for i in self._least(chosen, ridge):
-            others = [j for j in chosen if j != i]
-            if len(among) == len(self._all):
-                gains = self._largest(others, ridge, self._sort == self._sort[i], 1)
-            else:
-                gains = self._gains(others, ridge, among)
-                gains[self._sort[among] != self._sort[i]] = -np.inf
-            own = self._gains(others, ridge, np.array([i]))[0]
-            best = first_largest(gains, TIED * gains.max())
-            if gains[best] > (1.0 + TIED) * own:
-                return [*others, int(among[best])], True
-        return chosen, False
+    def _bounds(self, chosen: list[int], ridge: FloatArray) -> Bounds:
+        """Between what each candidate may add to the chosen."""
+        information = self._information(np.array(chosen, dtype=np.intp)) + ridge
+        return self._screen.bounds(information, self._cost)
 
-    def _least(self, chosen: list[int], ridge: FloatArray) -> list[int]:
-        """The `_TRIED` members that matter least, in order; of equals the first."""
-        at = np.sort(np.array(chosen, dtype=np.intp))
-        losses = self._changes(self._blocks[at], at, -1.0, ridge)
-        order: list[int] = []
+    def _least(self, chosen: IntArray, ridge: FloatArray) -> list[int]:
+        """The `_TRIED` members without which the least is lost, in order; of equals the first."""
+        at = np.sort(chosen)
+        members = self._blocks[at]
+        left, order = losses(members, self._information(at) + ridge, self._cost), list[int]()
         while len(order) < min(_TRIED, len(at)):
-            least = first_largest(-losses, TIED * abs(losses.min()))
+            least = first_largest(-left, TIED * abs(left.min()))
             order.append(int(at[least]))
-            losses[least] = np.inf
+            left[least] = np.inf
         return order
 
+    def _gains(self, chosen: list[int], ridge: FloatArray, offered: FloatArray) -> FloatArray:
+        """Return the gain of each of these candidates beside the chosen."""
+        information = self._information(np.array(chosen, dtype=np.intp)) + ridge
+        return gains(offered, information, self._cost)
+
     def _information(self, chosen: IntArray) -> FloatArray:
-        rows = self._blocks[chosen].reshape(-1, self._blocks.shape[2])
+        rows = self._blocks[np.sort(chosen)].reshape(-1, self._blocks.shape[2])
         information: FloatArray = rows.T @ rows + self._prior
         return information
-
-    def _gains(self, chosen: list[int], ridge: FloatArray, among: IntArray) -> FloatArray:
-        """Return the gain of each of these candidates beside the chosen; 0 for the chosen."""
-        at = np.sort(np.array(chosen, dtype=np.intp))
-        every = len(among) == len(self._blocks)
-        gains = self._changes(self._blocks if every else self._blocks[among], at, 1.0, ridge)
-        gains[np.isin(among, at)] = -np.inf
-        return gains
-
-    def _largest(
-        self, chosen: list[int], ridge: FloatArray, allowed: BoolArray, count: int
-    ) -> FloatArray:
-        """`_gains` among all, as far as they may be of the `count` largest; -inf of the others.
-
-        A gain takes several times as long as a bound of it, for which single precision will do.
-        """
-        first = max(4 * count, _SHORTLIST)
-        if len(self._all) <= first:
-            gains = self._gains(chosen, ridge, self._all)
-            gains[~allowed] = -np.inf
-            return gains
-        gains = np.full(len(self._all), -np.inf)
-        bounds = self._bounds(np.sort(np.array(chosen, dtype=np.intp)), ridge)
-        bounds[~allowed] = -np.inf
-        bounds[chosen] = -np.inf
-        some = np.sort(np.argpartition(-bounds, first - 1)[:first])
-        gains[some] = self._gains(chosen, ridge, some)
-        gains[~allowed] = -np.inf
-        least = np.partition(gains, -count)[-count]
-        rest = np.flatnonzero(
-            (bounds >= least - 2.0 * TIED * abs(least)) & np.isinf(gains) & allowed
-        )
-        if len(rest):
-            gains[rest] = self._gains(chosen, ridge, rest)
-        return gains
-
-    def _bounds(self, chosen: IntArray, ridge: FloatArray) -> FloatArray:
-        """Bound the gain of every candidate (N,).
-
-        With G = B C Bᵀ of a block, ln det(1 + G) ≤ k ln(1 + tr G / k), and what it takes off the
-        cost, tr((1 + G)⁻¹ S), is at most tr S. Single precision is allowed for.
-        """
-        covariance = np.asarray(np.linalg.inv(self._information(chosen) + ridge), np.float64)
-        square = covariance if self._determinant else covariance @ self._cost @ covariance
-        sizes, axes = np.linalg.eigh(0.5 * (square + square.T))
-        root = (axes * np.sqrt(np.maximum(sizes, 0.0))).astype(np.float32)
-        k, found = self._blocks.shape[1], np.empty(len(self._all))
-        for some in lots(len(found), _TOGETHER):
-            through = self._coarse[some.start * k : some.stop * k] @ root
-            found[some] = np.einsum("ij,ij->i", through, through).reshape(-1, k).sum(1)
-        rounding = len(root) * np.finfo(np.float32).eps * float(np.linalg.norm(root))
-        traces: FloatArray = (np.sqrt(found) + 2.0 * rounding * self._lengths) ** 2
-        return k * np.log1p(traces / k) if self._determinant else traces
 
     def _log_cost(self, chosen: IntArray, ridge: FloatArray) -> float:
         """Logarithm of what the criterion makes least."""
         information = self._information(chosen) + ridge
-        if self._determinant:
+        if self._cost is None:
             return -float(np.linalg.slogdet(information)[1])
         cost = float(np.trace(np.linalg.solve(information, self._cost)))
         return float(np.log(max(cost, np.finfo(float).tiny)))
 
-    def _changes(
-        self, blocks: FloatArray, chosen: IntArray, sign: float, ridge: FloatArray
-    ) -> FloatArray:
-        """Return the change of the criterion by adding a block to the chosen, or removing it."""
-        covariance = np.asarray(np.linalg.inv(self._information(chosen) + ridge), np.float64)
-        found = [
-            self._change(blocks[some], covariance, sign) for some in lots(len(blocks), _TOGETHER)
-        ]
-        return np.concatenate(found)
 
-    def _change(self, blocks: FloatArray, covariance: FloatArray, sign: float) -> FloatArray:
-        through = _times(blocks, covariance)
-        own = np.eye(blocks.shape[1]) + sign * (through @ blocks.transpose(0, 2, 1))
-        if self._determinant:
-            changes: FloatArray = sign * np.linalg.slogdet(own)[1]
-            return changes
-        spread = _times(through, self._cost) @ through.transpose(0, 2, 1)
-        return np.asarray(np.trace(np.linalg.solve(own, spread), axis1=1, axis2=2))
-
-
-def _times(blocks: FloatArray, matrix: FloatArray) -> FloatArray:
-    """Blocks (..., n) times a matrix (n, m), in one product, which takes less time than many."""
-    product: FloatArray = blocks.reshape(-1, len(matrix)) @ matrix
-    return product.reshape(*blocks.shape[:-1], -1)
+def _largest(values: FloatArray, count: int) -> IntArray:
+    """Where the largest of some values are, so many, and all that are equal to the last."""
+    if len(values) <= count:
+        return np.arange(len(values))
+    least = np.partition(values, -count)[-count]
+    return np.flatnonzero(values >= least - TIED * abs(least))

@@ -133,7 +133,7 @@ def read_at(robot: Calibratable, q: FloatArray, kinds: Sequence[Kind | Reading])
     """Poses (N,) at which every instrument reads all that it has to."""
     able = np.ones(len(q), dtype=bool)
     for instrument in map(as_reading, kinds):
-        rows, own = instrument.of_poses(q)
+        rows, own = instrument.required(q)
         if len(rows) > len(q):
             seen = np.isfinite(VirtualMachine(robot, 0.0).measure(rows, own).values)
             able &= seen.reshape(len(q), -1).all(axis=1)
@@ -289,7 +289,7 @@ def design_of(
         frame = rigid @ ways[:, : np.count_nonzero(sizes > UNDETERMINED * sizes[0])]
         flat = aimed.reshape(len(moved), -1)
         return design((flat - frame @ (frame.T @ flat)).reshape(aimed.shape)), True
-    first = sparse_basis(made.unidentifiable, chosen.names)[:, 0]
+    first = sparse_basis(made.unidentifiable, chosen.families)[:, 0]
     unknown = as_sum(first, chosen.names, chosen.units, chosen.scale)
     raise ArgumentError(
         f"candidates: not even all of them identify {unknown}, which moves the targets;"

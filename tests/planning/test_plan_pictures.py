@@ -51,6 +51,38 @@ def test_poses_are_those_at_which_the_whole_board_is_seen(
         pk.plan_poses(hexapod, candidates, count=20, kind=behind, noise=0.1, free=FREE)
 
 
+@pytest.mark.parametrize(
+    "board",
+    [
+        Board.chessboard(5, 4, 30), Board.charuco(6, 5, 30, 22, "4X4_50"),
+        Board.apriltags(4, 3, 30, 8), Board.circles(5, 4, 30),
+    ],
+    ids=lambda board: board.kind,
+)  # fmt: skip
+def test_what_is_printed_is_in_planned_pictures_whole(board: Board) -> None:
+    """By the formula of a pinhole: detectors need the squares around the outer corners, too."""
+    square, ends = board.sizes[0], board.places.max(axis=0)
+    margin = board.sizes[1] if board.kind == "apriltags" else square
+    inner = np.where(board.kind == "charuco", square, 0.0)
+    left, right = inner - margin, ends[:2] + margin
+    sheet = np.array([[x, y, 0] for x in (left, right[0]) for y in (left, right[1])])
+    robot, away, focal = pk.load("rotary-delta"), 900.0, 900.0
+    x, y, z = robot.home[:3]
+    carried = pk.screw.from_pose(np.array([20.0, -10, -30, np.pi, 0.05, 0.4]))
+    lying = pk.screw.from_pose(np.array([x - 60, y - 40, z - away, np.pi, 0, 0]))
+    camera = Camera(
+        fx=focal, fy=focal, cx=480, cy=360, width=960, height=720, board=board, on="platform",
+        stands=pk.screw.to_pose(np.linalg.inv(lying)), carried=pk.screw.to_pose(carried),
+    )  # fmt: skip
+    candidates = pk.sample_poses(robot, 150, seed=2, share=0.9)
+    plan = pk.plan_poses(robot, candidates, count=10, kind=camera, noise=0.1, prior=0.5)
+    motion = np.linalg.inv(pk.screw.from_pose(plan.poses) @ carried) @ lying
+    at = sheet @ motion[:, :3, :3].transpose(0, 2, 1) + motion[:, None, :3, 3]
+    pixel = focal * at[..., :2] / at[..., 2:] + [480, 360]
+    assert (at[..., 2] > 0).all() and (pixel >= 0).all() and (pixel <= [959, 719]).all()
+    assert plan.left_out > 0
+
+
 def test_a_plan_promises_what_a_calibration_by_its_pictures_gives(
     hexapod: pk.Robot, camera: Camera
 ) -> None:
