@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, IntArray, wrapped
+from pkmcal.arrays import BoolArray, FloatArray, IntArray, wrapped
 from pkmcal.core.library import POSE
 from pkmcal.geometry.carried import Load
 from pkmcal.kinematics.complete import written_as
@@ -86,6 +86,14 @@ class CommandedMachine:
         found = self._near(self._controller.forward(q, guess=poses).pose, coordinates)
         turned: FloatArray = coordinates + np.degrees(wrapped(np.radians(found - coordinates)))
         return np.where(self._turns, turned, found)
+
+    def keeps_limits(self, coordinates: FloatArray) -> BoolArray:
+        """Return whether the calibrated machine keeps its limits, as far as it states any."""
+        robot = self._calibrated
+        poses = self._poses(coordinates, robot)
+        if self._match:  # the other coordinates follow from these
+            poses = robot.forward(robot.inverse(poses, match=True), guess=poses).pose
+        return robot.feasible(poses).ok
 
     def continuous(self, commands: FloatArray) -> FloatArray:
         """Commands (..., N, n) of which actuators take the short way from each to the next."""

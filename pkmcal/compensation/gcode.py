@@ -195,6 +195,8 @@ class Program:
         for command in self._tools.in_order(found):
             meaning = self._meaning(command)
             changes = self._tools.changes(command, state.carried)
+            if self._times and command.name == "G96":
+                raise Unclear("G96 turns the spindle by X, which is a joint in a joint move")
             if changes:
                 meaning = Meaning.MOVES
             if macro and meaning is not Meaning.HARMLESS:

@@ -59,6 +59,8 @@ class Dialect:
         What its words mean, by name: ``"G1"``, ``"M104"``, ``"T"``, ``"SET_PIN"``.
     texts : frozenset of str
         Words behind which the rest of the line is a text; of several commands, if not in quotes.
+    unquoted : frozenset of str
+        Words that may take the rest of the line for a text where that is not in quotes.
     letters : frozenset of str
         Words that G0 and G1 may have beside axes.
     remark : str
@@ -96,12 +98,14 @@ class Dialect:
         Patterns of lines that versions of it read differently or that act unseen, and why each is
         refused.
     longest : int or None
-        How many characters of a line it reads, those of a comment behind it left out.
+        How many characters, in bytes, of a line it reads, those of a comment behind it left out
+        but in a block.
     """
 
     title: str
     words: dict[str, Meaning]
     texts: frozenset[str] = frozenset()
+    unquoted: frozenset[str] = frozenset()
     letters: frozenset[str] = frozenset("F")
     remark: str = r";.*"
     several: bool = False

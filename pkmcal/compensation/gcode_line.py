@@ -8,7 +8,8 @@ from typing import NamedTuple
 
 from pkmcal.compensation.gcode_dialect import AXES, Dialect, Meaning
 
-_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"
+_MOST_BYTES = 4  # of a character
+_NUMBER = r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)"
 
 
 def _ascii(pattern: str) -> re.Pattern[str]:
@@ -25,6 +26,8 @@ _HEAD = _ascii(
 _EXPONENT = _ascii(r"[\d.][Ee][-+]?[\d.]")
 _CHECKSUM = _ascii(r".*\*[ \t]*\d+[ \t]*")
 _TEXT = _ascii(r'"[^"]*"?|\{[^{}]*\}')
+_VALUE = rf"(?:_+(?!_)|{_NUMBER}(?![\d.]))"  # a text is blanked; whole, lest parts are tried
+_QUOTED = _ascii(rf"[ \t]*(?:[A-Za-z]?[ \t]*{_VALUE}[ \t]*)*")
 _NEXT = _ascii(r"[GgMm]")
 _LOWER = _ascii(r"'[GgMm]")
 _PASSED_OVER = _ascii(r"(?<![A-Za-z_=])[GgMm](?=[ \t]*\d)")
@@ -92,7 +95,10 @@ def commands(line: str, dialect: Dialect) -> list[Command]:
     code = bare(line, dialect)
     if code.strip() in ("", "%"):
         return []
-    return _of_block(code, dialect) if dialect.block else _in_turn(code, dialect)
+    if not dialect.block:
+        return _in_turn(code, dialect)
+    require_short(line, dialect)
+    return _of_block(code, dialect)
 
 
 @lru_cache
@@ -100,9 +106,12 @@ def _compiled(pattern: str) -> re.Pattern[str]:
     return re.compile(pattern)
 
 
-def require_short(code: str, dialect: Dialect) -> None:
-    """Refuse a line of which the end is not read."""
-    if dialect.longest is not None and len(code.rstrip()) > dialect.longest:
+def require_short(line: str, dialect: Dialect) -> None:
+    """Refuse a line that is longer than its firmware reads, the end of a printer's is a remark."""
+    if dialect.longest is None or len(line) * _MOST_BYTES <= dialect.longest:
+        return
+    read = line if dialect.block else bare(line, dialect).rstrip()
+    if len(read.encode("utf-8", errors="surrogateescape")) > dialect.longest:
         raise Unclear(f"{dialect.title} reads {dialect.longest} characters of a line")
 
 
@@ -195,9 +204,20 @@ def _command(code: str, dialect: Dialect) -> tuple[Command, int]:
         rest = _TEXT.sub(lambda found: "_" * len(found[0]), rest)
     if dialect.several and letter and _LOWER.search(rest):
         raise Unclear("a G or M behind ' begins a command in some versions and not in others")
+    remark = rest.partition("(")[2] if dialect.several and letter else ""
+    if remark and (")" not in remark or _NEXT.search(remark)):
+        raise Unclear(
+            f"parentheses behind {shown} are a remark to some versions, others read in it: put a"
+            " remark behind ;"
+        )
     following = None if macro else (_NEXT if dialect.several else _PASSED_OVER).search(rest)
     if following is not None:
         rest = rest[: following.start()]
+        quoted = '"' in code[: head.end() + len(rest)] and _QUOTED.fullmatch(rest)
+        if name in dialect.unquoted and not quoted:
+            raise Unclear(
+                f"what follows {shown} may be a text to it: put that in quotes, or break the line"
+            )
     end = head.end() + len(rest)
     if name and dialect.words.get(name) is not Meaning.FOLLOWED:
         return Command(name, shown, frozenset(_LETTER.findall(rest.upper()))), end

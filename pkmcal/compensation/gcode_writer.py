@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -9,13 +10,14 @@ import numpy as np
 from pkmcal.arrays import FloatArray
 from pkmcal.compensation.commanded_machine import CommandedMachine
 from pkmcal.compensation.gcode import Program
-from pkmcal.compensation.gcode_line import Unclear, bare, require_short
-from pkmcal.compensation.gcode_move import Move
+from pkmcal.compensation.gcode_line import Unclear, require_short
+from pkmcal.compensation.gcode_move import Feed, Move
 
 _DECIMALS = 5  # 10 nm, 0.04 arc seconds
 _FIGURES = 7  # of a feed
 _SLOWER = 0.02  # share by which the speed of a turning machine may differ
 _HALF = 0.5 * 10.0**-_DECIMALS
+_LINE_ENDS = re.compile("[\r\n]+")
 _Rows = Sequence[Sequence[float]]
 
 
@@ -52,13 +54,12 @@ class Writer:
             self._last = known or [None] * len(self._last)
         pieces = []
         before: Sequence[float] = move.start
-        done, fed = 0.0, False
+        done, in_force = 0.0, move.feed
         for k, (point, command, part) in enumerate(zip(points, commands, share, strict=True)):
             last = list(self._last)
             words = self._words(move, command, first=k == 0)
             extra = self._extruded(move, done, part, len(points))
-            feed = self._feed(move, before, point, last)
-            fed = fed or feed != ""
+            feed, in_force = self._feed(move, before, point, last, in_force)
             pieces.append((words, extra, feed))
             before, done = point, part
         text = _first(kept, move, *pieces[0]) + end
@@ -68,7 +69,12 @@ class Writer:
             named = [letter + value for letter, value in words.items()]
             text += " ".join([move.code, *named, *filter(None, [extra, feed])])
             text += move.repeated + end
-        if fed and not self._machine.joints:
+        if in_force != move.feed:
+            if move.behind:  # it would act before the feed that is written again: G20
+                raise self._program.wrong(
+                    move.line,
+                    f"{move.behind} acts behind a move whose feed changes: give it another line",
+                )
             head = "" if self._program.dialect.block else "G1 "
             text += f"{head}F{_figures(move.feed.turns)}" + end
         self._require_short(move, text)
@@ -76,12 +82,9 @@ class Writer:
 
     def _require_short(self, move: Move, text: str) -> None:
         """Refuse lines that became longer than the firmware reads."""
-        dialect = self._program.dialect
-        if dialect.longest is None or len(text) <= dialect.longest:
-            return
         try:
-            for each in text.splitlines():
-                require_short(bare(each, dialect), dialect)
+            for each in _LINE_ENDS.split(text):
+                require_short(each, self._program.dialect)
         except Unclear as error:
             raise self._program.wrong(move.line, f"as corrected: {error}") from None
 
@@ -159,26 +162,28 @@ class Writer:
         before: Sequence[float],
         point: Sequence[float],
         last: Sequence[float | None],
-    ) -> str:
-        """Return the word F, the feed, of a part of a move.
+        in_force: Feed,
+    ) -> tuple[str, Feed]:
+        """Return the word F, the feed, of a part of a move, and the feed that is then in force.
 
         Of a joint move, the reciprocal of its minutes. Else none, unless the controller would take
-        another time: it takes F along X, Y and Z, and along angles where none of these moves.
+        another time: it takes F along X, Y and Z, and along angles where none of these moves. An F
+        that was written for the part before is in force like one of the program.
         """
         joints = self._machine.joints
         if not move.straight or (not joints and (self._only_lengths or None in last)):
-            return ""
+            return "", in_force
         meant, way = self._way(np.subtract(point, before))
         rate = move.feed.lengths if meant else move.feed.turns
         if joints:
-            return f"F{_figures(rate / way)}" if way else "F1000000"
+            return f"F{_figures(rate / way)}" if way else "F1000000", in_force
         step = np.array(self._last, dtype=float) - np.array(last, dtype=float)
         written, longer = self._way(step)
-        taken = move.feed.lengths if written else move.feed.turns
+        taken = in_force.lengths if written else in_force.turns
         if not taken:  # at a speed of the firmware's own
             rate = taken = 1.0
         if not way or not longer or abs(longer * rate - way * taken) <= _SLOWER * way * taken:
-            return ""
+            return "", in_force
         if move.feed.turns <= 0.0:
             raise self._program.wrong(move.line, "needs a feed F: corrected, its length changes")
         if not np.isclose(move.feed.lengths, move.feed.turns * move.scale, rtol=1e-9, atol=0.0):
@@ -187,7 +192,8 @@ class Writer:
                 "its feed F was stated in other units, which changes it along X Y Z and not along"
                 " angles: state F again behind G20 or G21",
             )
-        return f"F{_figures(longer / (move.scale if written else 1.0) * rate / way)}"
+        stated = _figures(longer / (move.scale if written else 1.0) * rate / way)
+        return f"F{stated}", Feed(float(stated) * move.scale, float(stated))
 
     def _way(self, step: FloatArray) -> tuple[bool, float]:
         """Tell whether a step has lengths, and its length for a feed: mm, or deg without any."""

@@ -56,6 +56,15 @@ class CorrectedProgram(Result):
         How far the calibrated machine leaves the straight lines between the points: the largest
         found at quarters of every segment, and where it passes a node of a drive's table. No bound:
         beside these places it may be a sixteenth more. mm, an angle as its arc at ``robot.length``.
+    lowest_meant, lowest : float
+        The lowest Z of the program and of the commands, mm; of joint moves, and without Z, NaN. A
+        firmware that keeps to limits of its own, as Marlin and RepRapFirmware do without a word,
+        has to allow the latter.
+    beyond : int
+        Ends of segments at which the calibrated machine breaks a limit that its file states, such
+        as the stroke of a limb.
+    beyond_line : int or None
+        The line of the first of them.
     left : tuple of str
         Macros, changes of tools and words that the firmware's table has not, with the line where
         each is first. They stay as they are. What they move is not known: the next move behind each
@@ -67,6 +76,10 @@ class CorrectedProgram(Result):
     segments: int
     correction: float
     chord_error: float
+    lowest_meant: float
+    lowest: float
+    beyond: int = 0
+    beyond_line: int | None = None
     left: tuple[str, ...] = ()
 
     def _parts(self) -> Iterator[str]:
@@ -74,6 +87,16 @@ class CorrectedProgram(Result):
         if np.isfinite(self.correction):
             parts += f"; corrections up to {self.correction:.3g} mm"
         yield f"{parts}; found off the straight lines by up to {self.chord_error:.2g} mm"
+        if self.lowest < 0.0 <= self.lowest_meant:
+            yield (
+                f"commands go down to Z{self.lowest:.5f}, the program to Z{self.lowest_meant:.5f}:"
+                " the controller's limit has to be below"
+            )
+        if self.beyond:
+            yield (
+                f"{self.beyond} ends of segments are beyond limits of the calibrated machine, the"
+                f" first in line {self.beyond_line}"
+            )
         if self.left:
             named = ", ".join(self.left[:_MOST_LEFT])
             more = len(self.left) - _MOST_LEFT
@@ -135,7 +158,7 @@ def compensate_program(
     Returns
     -------
     CorrectedProgram
-        ``.text``, ``.moves``, ``.segments``, ``.correction``, ``.chord_error``.
+        ``.text``, ``.moves``, ``.segments``, ``.correction``, ``.chord_error``, ``.lowest``.
 
     Raises
     ------
@@ -198,7 +221,16 @@ def compensate_program(
         write_pieces(out, (piece.encode("utf-8", errors="surrogateescape") for piece in pieces))
     left = tuple(f"{name} (line {line + 1})" for name, line in program.left.items())
     return CorrectedProgram(
-        text, pieces.moves, pieces.segments, pieces.correction, pieces.chord_error, left
+        text,
+        pieces.moves,
+        pieces.segments,
+        pieces.correction,
+        pieces.chord_error,
+        pieces.lowest_meant,
+        pieces.lowest,
+        pieces.beyond,
+        pieces.beyond_line,
+        left,
     )
 
 

@@ -27,6 +27,12 @@ class Pieces:
         Moves that were read, and written.
     correction : float
         The largest correction of a position, mm; of joint moves, NaN.
+    lowest_meant, lowest : float
+        The lowest Z of the program and of the commands, mm; of joint moves, and without Z, NaN.
+    beyond : int
+        Ends of segments at which the calibrated machine breaks a limit that its file states.
+    beyond_line : int or None
+        The line of the first, counted from 1.
     chord_error : float
         The largest distance from a straight line that was found, mm.
     """
@@ -34,6 +40,9 @@ class Pieces:
     def __init__(self, program: Program, machine: CommandedMachine, chord: float) -> None:
         self.moves = self.segments = 0
         self.correction = np.nan if machine.joints else 0.0
+        self.lowest_meant = self.lowest = np.nan
+        self.beyond = 0
+        self.beyond_line: int | None = None
         self.chord_error = 0.0
         self._program, self._machine = program, machine
         self._errors = ChordErrors(program, machine, chord)
@@ -66,6 +75,10 @@ class Pieces:
         commands = self._commands(moves, which, points)
         self.moves, self.segments = self.moves + len(moves), self.segments + len(points)
         self._compare(points, commands)
+        broken = which[~self._machine.keeps_limits(points)]
+        self.beyond += len(broken)
+        if len(broken) and self.beyond_line is None:
+            self.beyond_line = moves[int(broken[0])].line + 1
         text, at, told = [], 0, commands.tolist()
         meant, shares = points.tolist(), share.tolist()
         counts = iter(parts.tolist())
@@ -90,12 +103,16 @@ class Pieces:
         return commands
 
     def _compare(self, points: FloatArray, commands: FloatArray) -> None:
-        """Note the largest correction of a position."""
+        """Note the largest correction of a position, and the lowest ones."""
         if self._machine.joints:
             return
         lengths = [k for k, letter in enumerate(self._machine.letters) if letter in "XYZ"]
         off = np.linalg.norm((points - commands)[:, lengths], axis=1)
         self.correction = max(self.correction, float(off.max()))
+        if "Z" in self._machine.letters:
+            k = self._machine.letters.index("Z")
+            self.lowest_meant = float(np.fmin(self.lowest_meant, points[:, k].min()))
+            self.lowest = float(np.fmin(self.lowest, commands[:, k].min()))
 
 
 def _lines_of(lines: _Lines, at: int, moves: int) -> int:

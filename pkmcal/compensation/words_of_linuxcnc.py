@@ -1,6 +1,7 @@
 """Words of LinuxCNC, after its documents: G-codes, M-codes, Order of Execution (2.9).
 
-User-defined codes, M100 to M199, are programs that nobody here knows.
+User-defined codes, M100 to M199, are programs that nobody here knows. It stops at a line of more
+than 252 characters with those of its comments, of which one may be a carriage return.
 """
 
 from pkmcal.compensation.gcode_dialect import Dialect, table
@@ -13,6 +14,7 @@ LINUXCNC = Dialect(
     remark=r"\([^()]*\)|;.*",
     letters=frozenset("FS"),
     inverse_time=True,
+    longest=251,
     unclear={r"(?i)[(;][ \t]*py(,|run|reload)": "a comment that runs Python may move the machine"},
     takes="M6",
     takes_unseen=frozenset({"M61"}),

@@ -4,12 +4,18 @@ A line may have several commands; behind one that runs a macro others are execut
 and not by others. M82 and M83 alone say whether E is relative; what is extruded relatively counts
 in later absolute numbers in some versions and not in others. A number that it has not, and so is
 not here, runs a macro of that name. M109 selects a tool if none is, and M291 with axes lets them be
-moved by hand. M37 simulates what follows. It passes over carriage returns.
+moved by hand. M37 simulates what follows. It passes over carriage returns. A file name or another
+text that is not in quotes goes on to the end of the line, whatever commands may be in it. Of a line
+its small boards read 100 characters, others 160 or 255.
 """
 
 from pkmcal.compensation.gcode_dialect import AXES, OFFSETS, Dialect, Meaning, table
 from pkmcal.compensation.words_of_printers import PRINTERS
 
+_UNQUOTED = frozenset({
+    "M20", "M30", "M36", "M36.1", "M39", "M98", "M118", "M374", "M408", "M409", "M470", "M471",
+    "M472", "M505", "M550", "M551", "M586", "M587", "M588", "M589", "M929", "M955", "M956",
+})  # fmt: skip
 REPRAP = Dialect(
     title="RepRapFirmware",
     several=True,
@@ -18,8 +24,10 @@ REPRAP = Dialect(
     extrusion=("M82 M83",),
     adds_relative=False,
     texts=frozenset({"M117"}),
+    unquoted=_UNQUOTED,
     remark=r'"[^"]*"?|;.*',
     rapid_lines=True,
+    longest=100,
     takes_unseen=frozenset({"M109"}),
     by_letters={"G10": OFFSETS, "M291": (AXES, Meaning.MOVES)},
     words=table(

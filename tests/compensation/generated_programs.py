@@ -69,7 +69,7 @@ ODD = {
         G1 Y10X3 | M117 a\\ | ; C:\\ | G1 X5 ; \\ | M665.1 L215 | M92.1 X80 | M306 T | G 91 |
         G1                                                                       X5 Y5 Z45 F700 |
         G54 | G60 | G5 X1 Y2 | T0 X5 | % | M26 S0 | M351 S1 X1 | M240 | M240 X5 | M915 | M916 X |
-        M862.3 P "a" | M25 | M704 | G0 X20 Y-9 S90
+        M862.3 P "a" | M25 | M704 | G0 X20 Y-9 S90 | M81 | M43 T
     """,
     "reprap": """
         GG1 X5 | MG90 | TG91 |
@@ -88,7 +88,7 @@ ODD = {
         M42 X5 | M600 X5 | G30 P0 X1 Y1 | M291 P"a" S3 X1 | M109 S200 | M226 | M7 | G80 | G40 |
         M560 P"a" | M596 P1 | M594 P1 | M916 | G38.2 Z-5 | G28 M106 S1 | M98 P"a" G1 X3 Y2 Z40 |
         G 1 X7 | M 83 | N 3 G1 X5 | M37 S1 | M37 P"a" | M26 S0 | M665.1 R5 | (G1 X5) |
-        M651 | M601 | M957 E"a"
+        M651 | M601 | M957 E"a" | M81 | M106 S1 (G91) | M106 S1 (a ; b) G91 | M107 (G20
     """,
     "klipper": """
         G2 X1 Y1 I1 | G92 X0 | G92 | SET_GCODE_OFFSET Z=0.1 | SET_KINEMATIC_POSITION X=10 |
@@ -100,7 +100,8 @@ ODD = {
         G92 E0 | G92 E4 | SDCARD_PRINT_FILE FILENAME=a | M23 a | M24 | G1 X5 X6 | N3 G1 X5 |
         N3G1 X5 | G91.1 | G1 F900 | F900 | G1 X5 R2 | DELTA_CALIBRATE | save_gcode_state |
         G 1 X7 | M 83 | N 3 G1 X7 | # G1 X5 | G1 X 7 | SET_TMC_FIELD STEPPER=a FIELD=MRES VALUE=3 |
-        M600 X5 | G92.1 | G1 X5*3 | set_skew xy=1 | SAVE_GCODE_STATE NAME=X | T0 X5 | G1.0 X5
+        M600 X5 | G92.1 | G1 X5*3 | set_skew xy=1 | SAVE_GCODE_STATE NAME=X | T0 X5 | G1.0 X5 |
+        M25 | M81
     """,
 }
 

@@ -323,6 +323,11 @@ REFUSED = [
     ("reprap", 'M32 "a.g"', "M32 runs another program"),
     ("reprap", "M906 X5 'G1 X9", "a G or M behind '"),
     ("reprap", "G1 X5 G1 Y5", "two moves stand in it"),
+    ("reprap", "M505 Psys G91", "what follows M505 may be a text"),
+    ("reprap", "M505 Pmy_folder G91", "what follows M505 may be a text"),
+    ("reprap", 'M505 Pmy"folder" G91', "what follows M505 may be a text"),
+    ("reprap", "M20 SG91", "what follows M20 may be a text"),
+    ("reprap", "M550 P5 G91", "what follows M550 may be a text"),
     *[
         ("klipper", f"{each} X=1", f"{each} {ORIGIN}")
         for each in ("SET_GCODE_OFFSET", "SET_KINEMATIC_POSITION", "SET_SKEW", "SKEW_PROFILE")
@@ -344,6 +349,21 @@ def test_what_cannot_be_followed_is_refused_with_its_line(
     with pytest.raises(pk.FileError) as caught:
         corrected(tmp_path, f"G1 X1 Y1 Z20\n{line}\n", firmware=firmware)
     assert f"part.gcode, line 2: {reason}" in str(caught.value)
+
+
+def test_what_stands_behind_a_quoted_text_is_a_command(tmp_path: Path) -> None:
+    begin = "G90\nG1 X1 Y1 Z20\n"
+    quoted = corrected(tmp_path, begin + 'M505 P"sys" G91\nG1 X5\n', firmware="reprap")
+    alone = corrected(tmp_path, begin + "G91\nG1 X5\n", firmware="reprap")
+    assert quoted.text.splitlines()[-1] == alone.text.splitlines()[-1]
+
+
+def test_a_spindle_that_turns_by_x_is_refused_with_joint_moves(tmp_path: Path) -> None:
+    """X is the length of a joint then; of poses it is the radius, nearly as it was."""
+    text = "G0 X1 Y1 Z20\nG96 D900 S50\nG1 X5 F100\n"
+    with pytest.raises(pk.FileError, match="line 2: G96 turns the spindle by X"):
+        corrected(tmp_path, text, joints=True)
+    assert "G96 D900 S50" in corrected(tmp_path, text, firmware="linuxcnc").text
 
 
 def test_a_word_that_is_passed_is_taken_to_do_no_harm(tmp_path: Path) -> None:
@@ -443,6 +463,30 @@ def test_a_turn_takes_the_time_that_its_feed_states(unit: float, tmp_path: Path)
     assert not any("F" in line for line in lines[back + 1 :])
 
 
+def test_a_part_behind_one_with_another_feed_has_its_own_feed(tmp_path: Path) -> None:
+    """The F that is written for a part is in force for the next ones."""
+    robot = pk.load("hexapod")
+    path = tmp_path / "part.ngc"
+    begin, end = [5.395, 0.989, 794.645, -8.144, 11.278, 0.386], [4.627, 1.236, 795.199]
+    end += [10.015, -11.05, 0.686]
+    lines = [
+        "G1 " + " ".join(f"{k}{v}" for k, v in zip("XYZABC", at, strict=True))
+        for at in (begin, end)
+    ]
+    path.write_text(f"{lines[0]} F600\n{lines[1]}\nG1 X9\n")
+    machine = robot.replace(HEXAPOD_CHANGES)
+    found = pk.compensate_program(robot, machine, path, firmware="linuxcnc", chord=0.005).text
+    lines = found.splitlines()
+    back = lines.index("F600")
+    ways = np.linalg.norm(np.diff(followed(found, "XYZABC")[:back, :3], axis=0), axis=1)
+    feeds: list[float] = []
+    for line in lines[1:back]:
+        feeds += [float(each) for each in re.findall(r"F(\S+)", line)] or feeds[-1:] or [600.0]
+    meant = np.linalg.norm(np.subtract(begin, end)[:3]) / 600.0 / (back - 1)
+    assert back > 3
+    np.testing.assert_allclose(ways / np.array(feeds), meant, rtol=0.0201)
+
+
 @pytest.mark.parametrize(
     "line",
     [
@@ -514,6 +558,9 @@ def test_a_byte_order_mark_stays_before_a_remark_and_is_refused_before_words(
         ("marlin", "n5 G1 X5", "not in capitals"),
         ("marlin", "G1" + 90 * " " + "X5 Y5", "reads 95 characters"),
         ("reprap", "G 91", "not all read"),
+        ("reprap", "M106 (fan, not G91) S1", "a remark to some versions"),
+        ("reprap", "M106 S1 (fan, not G91", "a remark to some versions"),
+        ("reprap", "M106 S1 (fan ; on) G91", "a remark to some versions"),
         ("reprap", "M37 S1", "runs another program"),
         ("reprap", "M26 S0", "cannot be followed"),
         ("klipper", "G 1 X7", "not all read"),
@@ -527,13 +574,31 @@ def test_lines_that_act_unseen_or_are_not_read_by_all_are_refused(
         corrected(tmp_path, f"G1 X1 Y1 Z20 F600\n{line}\nG1 X2\n", firmware=firmware)
 
 
-def test_a_line_that_becomes_longer_than_its_firmware_reads_is_refused(tmp_path: Path) -> None:
-    """Marlin passes over the end, and so over the feed."""
-    text = "G1 X1 Y1 Z20 F600\nG1 X1.1{}F12345.678 ; and a long remark, which does not count\n"
-    found = corrected(tmp_path, text.format(54 * " "), firmware="marlin").text
-    assert 90 < len(found.splitlines()[1].partition(";")[0].rstrip()) <= 95
-    with pytest.raises(pk.FileError, match="line 2: as corrected: Marlin reads 95"):
-        corrected(tmp_path, text.format(60 * " "), firmware="marlin")
+@pytest.mark.parametrize(
+    ("firmware", "most", "remark"),
+    [
+        ("marlin", 95, " ; and a long remark, which does not count"),
+        ("reprap", 100, " ; and a long remark, which does not count"),
+        ("linuxcnc", 251, ""),
+        ("linuxcnc", 251, " ; a remark counts"),
+        ("linuxcnc", 251, " (each Ä has two bytes)"),
+    ],
+)
+def test_a_line_that_becomes_longer_than_its_firmware_reads_is_refused(
+    firmware: str, most: int, remark: str, tmp_path: Path
+) -> None:
+    """Printers pass over the end, and so over the feed; LinuxCNC stops there."""
+    text = "G1 X1 Y1 Z20 F600\nG1 X1.1{}F12345.678" + remark + "\n"
+    counted = len(remark.encode()) if firmware == "linuxcnc" else 0
+    spaces = most - counted - len("G1 X1.23456 Y1.23456 Z20.23456F12345.678")
+    found = corrected(tmp_path, text.format((spaces - 2) * " "), firmware=firmware).text
+    line = found.splitlines()[1]
+    read = len(line.encode()) if counted else len(line.removesuffix(remark))
+    assert most - 5 < read <= most
+    with pytest.raises(pk.FileError, match=f"line 2: as corrected: .* reads {most}"):
+        corrected(tmp_path, text.format((spaces + 4) * " "), firmware=firmware)
+    with pytest.raises(pk.FileError, match=f"line 2: [^:]* reads {most}"):
+        corrected(tmp_path, text.format(most * " "), firmware=firmware)
 
 
 def test_angles_of_the_start_are_not_those_of_homing(tmp_path: Path) -> None:
@@ -575,6 +640,56 @@ def test_the_command_line_writes_the_program_by_its_name(
     assert "--out is needed" in refused(*arguments)
     assert "--match says nothing of a program" in refused(*arguments, "--match", "x")
     assert "--start must be" in refused(*arguments, "--out", "x", "--start", "a", *marlin)
+
+
+def test_commands_below_zero_are_said_where_the_program_has_none(tmp_path: Path) -> None:
+    """Printers keep to their limits without a word."""
+    machine = DELTA.replace({f"rod{k}": DELTA.geometry[f"rod{k}"] - 0.6 for k in (1, 2, 3)})
+    path = tmp_path / "part.gcode"
+    path.write_text("G1 X0 Y0 Z0.2 F600\nG1 X9\n")
+    found = pk.compensate_program(DELTA, machine, path, firmware="marlin")
+    lowest = followed(found.text)[:, 2].min()
+    assert found.lowest_meant == 0.2 and found.lowest == pytest.approx(lowest, abs=1e-5)
+    assert lowest < -0.1 and f"commands go down to Z{lowest:.3f}" in str(found)
+    path.write_text("G1 X0 Y0 Z20 F600\nG1 X9\n")
+    assert "go down" not in str(pk.compensate_program(DELTA, machine, path, firmware="marlin"))
+    path.write_text("G0 X0 Y0 Z0.2\n")
+    found = pk.compensate_program(DELTA, machine, path, firmware="linuxcnc", joints=True)
+    assert np.isnan([found.lowest, found.lowest_meant]).all()
+
+
+@pytest.mark.parametrize(("room", "beyond"), [(0.02, 0), (-0.02, 1)])
+def test_limits_are_looked_at_where_a_constrained_machine_is(
+    room: float, beyond: int, tmp_path: Path
+) -> None:
+    """Tilted, it is moved aside, too, and its sliders are elsewhere than the tilt alone says."""
+    robot = pk.load("3prs")
+    tilted = np.array([[0.0, 0.0, 700.0, *np.radians([12.0, 9.0]), 0.0]])
+    needed = robot.inverse(tilted, match=True)[0]
+    assert np.abs(needed - robot.inverse(robot.forward(needed).pose)).max() < 1e-6
+    data = content(robot)
+    for limb, q in zip(data["limb"], needed, strict=True):
+        limb["stroke"] = [0.0, float(q) + room if q == needed.max() else 420.0]
+    path = tmp_path / "part.ngc"
+    path.write_text("G0 Z700 A12 B9\n")
+    machine = parsed(data)
+    found = pk.compensate_program(robot, machine, path, firmware="linuxcnc")
+    assert found.beyond == beyond
+
+
+@pytest.mark.parametrize("joints", [False, True])
+def test_limits_that_the_machine_states_are_said_where_they_are_broken(
+    joints: bool, tmp_path: Path
+) -> None:
+    low, high = DELTA.model.limbs[0].stroke or (0.0, 0.0)
+    rest = float(DELTA.inverse(DELTA.home)[0]) - float(DELTA.home[2])
+    inside, *outside = high - rest - 9, high - rest + 9, low - rest - 9
+    text = f"G0 X0 Y0 Z{inside:.3f}\nM5\n" + "".join(f"G0 Z{z:.3f}\n" for z in outside)
+    found = corrected(tmp_path, text, firmware="linuxcnc", joints=joints)
+    assert (found.beyond, found.beyond_line) == (2, 3)
+    assert "2 ends of segments are beyond limits" in str(found) and "line 3" in str(found)
+    found = corrected(tmp_path, text.partition("M5")[0], firmware="linuxcnc", joints=joints)
+    assert found.beyond == 0 and found.beyond_line is None and "beyond" not in str(found)
 
 
 def test_machines_that_are_not_alike_are_refused(tmp_path: Path) -> None:
@@ -651,3 +766,17 @@ def test_a_program_is_written_as_a_whole_or_not_at_all(tmp_path: Path) -> None:
     with pytest.raises(pk.FileError, match="line 4201: G2 cannot be followed"):
         pk.compensate_program(DELTA, machine, path, out=out, **options)
     assert out.read_bytes() == before and len(list(tmp_path.iterdir())) == 2
+
+
+@pytest.mark.parametrize(("units", "other"), [("G21", "G20"), ("G20", "G21")])
+def test_units_behind_a_move_whose_feed_changes_are_refused(
+    units: str, other: str, tmp_path: Path
+) -> None:
+    """The feed that is written again behind it would be read in the other units."""
+    robot = pk.load("hexapod")
+    numbers = {name: robot.geometry[name] + 0.7 for name in ("base1.x", "base3.y", "offset5")}
+    program = tmp_path / "program.g"
+    height = 800 if units == "G21" else 31.5
+    program.write_text(f"{units}\nG90\nG1 X0 Y0 Z{height} A0 B0 C0 F600\nG1 C8 {other}\n")
+    with pytest.raises(ValueError, match=f"line 4: {other} acts behind a move"):
+        pk.compensate_program(robot, robot.replace(numbers), program, firmware="reprap", chord=1.0)

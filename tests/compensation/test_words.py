@@ -38,6 +38,39 @@ def test_what_may_move_a_duet_asks_for_all_axes(tmp_path: Path, line: str) -> No
         compensated(text, tmp_path, firmware="reprap")
 
 
+@pytest.mark.parametrize(
+    ("firmware", "line", "why"),
+    [
+        ("reprap", f'M36 "{40 * "a"}" x,G91', "may be a text to it"),
+        ("reprap", f'M36 "a" {40 * "1"}x, G91', "may be a text to it"),
+        ("klipper", f"G1 X{200_000 * '1'}z", "is no plain G-code"),
+    ],
+)
+def test_a_line_is_read_in_little_time_however_long_it_is(
+    tmp_path: Path, firmware: str, line: str, why: str
+) -> None:
+    """Each took half an hour or more: all ways to see parts in it were tried."""
+    with pytest.raises(pk.FileError, match=f"line 1: .*{why}"):
+        compensated(line, tmp_path, firmware=firmware)
+
+
+@pytest.mark.parametrize(("firmware", "line"), [("klipper", "M25"), ("marlin", "M43 T")])
+def test_what_pauses_or_toggles_pins_may_have_moved_it(
+    tmp_path: Path, firmware: str, line: str
+) -> None:
+    with pytest.raises(pk.FileError, match="where Y and Z is, is not known here, behind M"):
+        compensated(f"G1 X0 Y0 Z50 F3000\n{line}\nG1 X3\n", tmp_path, firmware=firmware)
+
+
+@pytest.mark.parametrize("firmware", ["marlin", "reprap", "klipper"])
+def test_motors_without_power_may_have_been_moved(tmp_path: Path, firmware: str) -> None:
+    """M81 switches the power supply off."""
+    text = "G1 X0 Y0 Z50 F3000\nM81\nM80\nG1 {}\n"
+    with pytest.raises(pk.FileError, match=r"line 4: where Y and Z is, .* behind M8[01]"):
+        compensated(text.format("X3"), tmp_path, firmware=firmware)
+    assert "M81 (line 2)" in compensated(text.format("X3 Y0 Z50"), tmp_path, firmware=firmware).left
+
+
 def test_each_part_of_a_laser_move_states_its_power(tmp_path: Path) -> None:
     found = compensated("G1 X-30 Y0 Z50 F3000\nG1 X30 S128\n", tmp_path, chord=1e-3)
     parts = found.text.splitlines()[1:]
