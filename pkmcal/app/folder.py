@@ -9,10 +9,12 @@ from __future__ import annotations
 import contextlib
 import filecmp
 import json
+import os
 import shutil
 import stat
 import sys
-from collections.abc import Mapping
+import weakref
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -57,6 +59,7 @@ class Folder:
     def __init__(self, path: Path) -> None:
         path.mkdir(parents=True, exist_ok=True)
         self.path = path.resolve()
+        self._same = _identity(self.path)
         self.project, self.version = Project(), 1
         self._before: list[Project] = []
         self._content: bytes | None = None  # of the project's file, as it was read or written last
@@ -80,12 +83,27 @@ class Folder:
         ValueError
             A mistake in it, with its line, or the folder is gone; the state is what it was.
         """
+        self.refuse_gone()
+        if self._follow():
+            self.version += 1
+
+    def refuse_gone(self) -> None:
+        """Refuse a folder that is gone, and another one by its name: processes are in the former.
+
+        Raises
+        ------
+        ValueError
+            With what brings it back.
+        """
         if not self.path.is_dir():
             raise ArgumentError(
                 f"{self.path}: the folder of this project is gone: bring it back to go on"
             )
-        if self._follow():
-            self.version += 1
+        if not self._same():
+            raise ArgumentError(
+                f"{self.path}: another folder has this name now: bring the former back, or end"
+                " pkmcal app in its terminal and start it again"
+            )
 
     def _follow(self) -> bool:
         try:
@@ -218,6 +236,22 @@ class Folder:
     @staticmethod
     def _is_users(path: Path) -> bool:
         return path.is_file() and not path.name.startswith(".") and path.name != FILE
+
+
+def _identity(folder: Path) -> Callable[[], bool]:
+    """Return what tells whether a folder is still the one that has its name now.
+
+    It is held open, for file systems that number a folder anew once nobody has it.
+    """
+    if sys.platform == "win32":  # where a folder that a process is in cannot be renamed
+        return lambda: True
+    place = os.open(folder, os.O_RDONLY)
+
+    def same() -> bool:
+        return os.path.samestat(os.fstat(place), folder.stat())
+
+    weakref.finalize(same, os.close, place)
+    return same
 
 
 def _content(file: Path) -> bytes:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import os
 import secrets
+import signal
 import socket
 import webbrowser
 from collections.abc import Callable, Iterator
@@ -22,7 +24,9 @@ DOOR = ".open-pkmcal.html"
 _DOOR = """<!doctype html><meta charset="utf-8"><title>pkmcal</title>
 <meta http-equiv="refresh" content="0; url={url}"><a href="{url}">pkmcal</a>
 """
+_CLOSED = getattr(signal, "SIGHUP", None)  # the terminal; Windows has it not
 _QUEUE = 64  # connections that wait to be taken
+_PATIENCE = 1.0  # s that a page has for the last that it is told
 
 
 def launch(
@@ -79,8 +83,7 @@ def _serve(
         application, end = guarded(folder, port, token, door, testing)
         config = uvicorn.Config(
             application, log_level="error", access_log=False,
-            proxy_headers=False, server_header=False, timeout_graceful_shutdown=1, lifespan="on",
-            ws="none",
+            proxy_headers=False, server_header=False, lifespan="on", ws="none",
         )  # fmt: skip
         say(f"{folder.path}\n{url}")
         _Ending(config, end).run(sockets=[listening])
@@ -93,9 +96,38 @@ class _Ending(uvicorn.Server):
         super().__init__(config)
         self._end = end
 
+    @contextlib.contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        """Also end in order when the terminal is closed, which uvicorn leaves to others."""
+        with super().capture_signals():
+            before = None if _CLOSED is None else signal.getsignal(_CLOSED)
+            if _CLOSED is None or before in (signal.SIG_IGN, None):  # under nohup, or embedded
+                yield
+                return
+            signal.signal(_CLOSED, self.handle_exit)
+            try:
+                yield
+            finally:
+                signal.signal(_CLOSED, before)
+
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         super().handle_exit(sig, frame)
         self._end()
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """Cut connections off that are not closed in time, which is no error of anybody's.
+
+        With its own timeout uvicorn cancels their tasks, and prints a traceback of each.
+        """
+        cutting = asyncio.get_running_loop().call_later(_PATIENCE, self._cut)
+        try:
+            await super().shutdown(sockets)
+        finally:
+            cutting.cancel()
+
+    def _cut(self) -> None:
+        for each in list(self.server_state.connections):
+            each.transport.abort()
 
 
 @contextlib.contextmanager

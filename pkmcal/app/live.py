@@ -10,7 +10,7 @@ import asyncio
 import contextlib
 import json
 import secrets
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from typing import Any
 
 from starlette.requests import Request
@@ -37,10 +37,12 @@ class Live:
     ----------
     folder : Folder
         The project, in which rows are written.
+    follow : callable
+        Takes over what was edited in the project's file.
     """
 
-    def __init__(self, folder: Folder) -> None:
-        self._folder = folder
+    def __init__(self, folder: Folder, follow: Callable[[], None]) -> None:
+        self._folder, self._follow = folder, follow
         self._name = ""  # of the run; who has it may start it
         self._process: asyncio.subprocess.Process | None = None
 
@@ -60,7 +62,7 @@ class Live:
         if self._name:
             return _refused(409, _ELSEWHERE)
         try:
-            self._folder.follow()
+            self._follow()
             self._folder.refuse_links(self._folder.project)
         except (Error, OSError) as error:
             return _refused(400, words_of(error))

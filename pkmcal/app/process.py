@@ -95,35 +95,44 @@ class Worker:
 
         Who stops listening ends the process, for nobody waits for what it does.
         """
-        async with self._one_by_one:
+        await self._one_by_one.acquire()
+        done = False
+        try:
             process = await self.start()
             assert process.stdin is not None and process.stdout is not None
             number = next(self._numbers)
             line = json.dumps({"id": number, "operation": operation, **asked}) + "\n"
-            done = False
-            try:
-                with contextlib.suppress(ConnectionError):
-                    process.stdin.write(line.encode())
-                    await process.stdin.drain()
-                    while answer := await process.stdout.readline():
-                        message = json.loads(answer)
-                        if message.pop("id") != number:
-                            continue
-                        done = "result" in message or "error" in message
-                        if done:
-                            self._prepare()
-                        yield message
-                        if done:
-                            return
-                code = await process.wait()
-                done = True
-                how = f" (signal {signal.Signals(-code).name})" if code < 0 else ""
-                await self.start()
-                self._prepare()
-                yield {"error": {"message": _FAILED.format(how=how), "crashed": True}}
-            finally:
-                if not done:
-                    await asyncio.shield(self.restart())
+            with contextlib.suppress(ConnectionError):
+                process.stdin.write(line.encode())
+                await process.stdin.drain()
+                while answer := await process.stdout.readline():
+                    message = json.loads(answer)
+                    if message.pop("id") != number:
+                        continue
+                    done = "result" in message or "error" in message
+                    if done:
+                        self._prepare()
+                    yield message
+                    if done:
+                        return
+            code = await process.wait()
+            done = True
+            how = f" (signal {signal.Signals(-code).name})" if code < 0 else ""
+            await self.start()
+            self._prepare()
+            yield {"error": {"message": _FAILED.format(how=how), "crashed": True}}
+        finally:
+            if done:
+                self._one_by_one.release()
+            else:
+                await asyncio.shield(self._ended())
+
+    async def _ended(self) -> None:
+        """End a request that nobody waits for: the next one has another process, not that."""
+        try:
+            await self.restart()
+        finally:
+            self._one_by_one.release()
 
     async def restart(self) -> None:
         """End what the process does, and have another."""

@@ -55,7 +55,8 @@ class Server:
         self._folder, self._worker, self._operations, self._door = folder, worker, operations, door
         self._listeners: set[asyncio.Queue[Message | None]] = set()
         self._running: dict[str, asyncio.Event] = {}
-        self._live = Live(folder)
+        self._announced = folder.version
+        self._live = Live(folder, self._follow)
 
     def application(self) -> Starlette:
         """Return the routes, without the guard."""
@@ -99,10 +100,24 @@ class Server:
     async def state(self, request: Request) -> Response:
         """The project, its files, and what each screen does as lines for a terminal."""
         try:
-            self._folder.follow()
+            self._follow(_tab(request))
         except (Error, OSError) as error:
             return JSONResponse({**self._state(), "trouble": str(error)})
         return JSONResponse(self._state())
+
+    def _follow(self, by: str = "") -> None:
+        """Take over what was edited in the project's file, and tell all pages but who asked."""
+        try:
+            self._folder.follow()
+        finally:
+            self._announce(by)
+
+    def _announce(self, by: str) -> None:
+        if self._folder.version == self._announced:
+            return
+        self._announced = self._folder.version
+        for queue in self._listeners:
+            queue.put_nowait({"changed": self._announced, "by": by})
 
     def _state(self) -> Message:
         folder = self._folder
@@ -114,6 +129,7 @@ class Server:
             "undo": folder.undoable,
             "commands": commands(folder.project),
             "enter": quoted(["cd", str(folder.path)]),
+            "again": quoted(["pkmcal", "app", str(folder.path)]),
             "machines": _built_in(),
             "gcode": GCODE,
         }
@@ -149,11 +165,9 @@ class Server:
             return _refused(507, words_of(error))
 
     def _changed(self, request: Request, taken: bool) -> Response:
+        self._announce(_tab(request))
         if not taken:
             return JSONResponse({**self._state(), "error": "changed elsewhere"}, 409)
-        told = {"changed": self._folder.version, "by": request.headers.get("x-pkmcal-tab", "")}
-        for queue in self._listeners:
-            queue.put_nowait(told)
         return JSONResponse(self._state())
 
     async def upload(self, request: Request) -> Response:
@@ -164,7 +178,10 @@ class Server:
         if not announced.isdecimal() or int(announced) > room:
             return _refused(413, large)
         try:
+            self._folder.refuse_gone()
             place, part = tempfile.mkstemp(UPLOAD[1], UPLOAD[0], self._folder.path)
+        except Error as error:
+            return _refused(400, str(error))
         except OSError as error:
             return _refused(507, f"the file could not be kept: {error.strerror}")
         try:
@@ -200,7 +217,7 @@ class Server:
 
     async def _lines(self, operation: str, asked: Message) -> AsyncIterator[bytes]:
         try:
-            self._folder.follow()
+            self._follow()
             self._folder.refuse_links(self._folder.project)
         except (Error, OSError) as error:
             yield _line({"error": {"message": words_of(error)}})
@@ -329,6 +346,10 @@ def _constant(path: str, content: bytes, kind: str) -> Route:
 
 def _streamed(lines: AsyncIterator[bytes]) -> StreamingResponse:
     return StreamingResponse(lines, media_type="application/x-ndjson")
+
+
+def _tab(request: Request) -> str:
+    return request.headers.get("x-pkmcal-tab", "")
 
 
 def _refused(status: int, why: str) -> Response:

@@ -41,6 +41,7 @@ from pkmcal.jobs.written import Written, save_robot
 from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.live import registry
 from pkmcal.live.measuring_run import Rules
+from pkmcal.progress import Progress
 from pkmcal.view import page
 
 Table = dict[str, Any]
@@ -80,13 +81,13 @@ class Work:
             self.fitted = None
         return self.sources
 
-    def fit(self, project: Project) -> pk.Identification:
+    def fit(self, project: Project, progress: Progress | None = None) -> pk.Identification:
         """Identify, if anything changed since."""
         sources = self.read(project)
         asked = (self.key, project.calibration)
         if self.found is None or self.fitted != asked:
             given = calibrating.arguments(project.calibration, sources, self.notes.append)
-            self.found = calibrating.identified(sources, given)
+            self.found = calibrating.identified(sources, given, progress)
             self.fitted = asked
         return self.found
 
@@ -221,7 +222,7 @@ def fit(work: Work, state: Table, given: Table, say: Say) -> Table:
     say("reading", 0.1)
     work.read(project)
     say("identifying", 0.2)
-    found = work.fit(project)
+    found = work.fit(project, lambda done, of: say("identifying", 0.2 + 0.5 * done / of))
     say("judging", 0.7)
     return telling.calibration(found, project.calibration, work.lines(project))
 

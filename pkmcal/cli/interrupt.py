@@ -1,4 +1,4 @@
-"""Ctrl-C, and signals that ask a program to end.
+"""Ctrl-C, and signals that ask a program to end; and the one of a pipe that nobody reads.
 
 While the program is loaded or ends they end it at once, while a verb works they are raised.
 Imports next to nothing, so that they are provided for from the beginning.
@@ -8,13 +8,18 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
+import threading
 import time
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from types import FrameType
 
 _NAMES = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")  # the last is that of a console of Windows
 _SIGNALS = [getattr(signal, name) for name in _NAMES if hasattr(signal, name)]
 _TWICE = 1.0  # s: a terminal that closes says so twice
+_AGAIN = 0.01  # s, after which a signal is raised again where Python ignored what it raised
+_UNREAD = getattr(signal, "SIGPIPE", None)  # what is written to is closed; Windows has it not
 
 
 class Stopped(KeyboardInterrupt):
@@ -46,11 +51,36 @@ def ends_at_once() -> None:
     _handle(_end)
 
 
+def ends_with_its_reader() -> None:
+    """End at once when nobody reads what is printed, as others do: `pkmcal … | head`."""
+    if _UNREAD is not None:
+        signal.signal(_UNREAD, signal.SIG_DFL)
+
+
+@contextmanager
+def lost_connections_are_errors() -> Iterator[None]:
+    """While in this context: a connection or process that is gone is raised, and ends nothing.
+
+    For a verb that speaks with others than its terminal: the system sends one signal for all.
+    """
+    before = None if _UNREAD is None else signal.signal(_UNREAD, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        if _UNREAD is not None:
+            signal.signal(_UNREAD, before)
+
+
 class IsRaised:
-    """While in this context: as KeyboardInterrupt, so that what was begun is tidied up."""
+    """While in this context: as KeyboardInterrupt, so that what was begun is tidied up.
+
+    What is raised while Python tidies up an object, as in a callback of a weak reference, it prints
+    and ignores: such a signal is raised again.
+    """
 
     def __enter__(self) -> None:
         self._before = [signal.getsignal(number) for number in _SIGNALS]
+        self._hook, sys.unraisablehook = sys.unraisablehook, self._ignored
         self._last = -_TWICE
         self._begin()
 
@@ -62,7 +92,15 @@ class IsRaised:
         if self._last - before >= _TWICE:  # else it is being tidied up
             raise Stopped(number)
 
+    def _ignored(self, unraisable: sys.UnraisableHookArgs) -> None:
+        if not isinstance(unraisable.exc_value, Stopped):
+            self._hook(unraisable)
+            return
+        self._last = -_TWICE
+        threading.Timer(_AGAIN, _again, [unraisable.exc_value.number]).start()
+
     def __exit__(self, *_: object) -> None:
+        sys.unraisablehook = self._hook
         for number, handler in zip(_SIGNALS, self._before, strict=True):
             if handler is not None:
                 signal.signal(number, handler)
@@ -86,6 +124,15 @@ def _end(number: int, frame: FrameType | None) -> None:
     with suppress(OSError):  # there may be no stderr
         os.write(2, f"pkmcal: {_said(number)}\n".encode())
     os._exit(128 + number)
+
+
+def _again(number: int) -> None:
+    """Raise a signal in the main thread, whose sleep it ends."""
+    main = threading.main_thread().ident
+    if main is None or not hasattr(signal, "pthread_kill"):  # Windows
+        signal.raise_signal(number)
+    else:
+        signal.pthread_kill(main, number)
 
 
 def _number(stop: KeyboardInterrupt) -> int:

@@ -19,7 +19,6 @@ def main() -> None:
     import codecs
     import io
     import os
-    import signal
     import sys
     import warnings
 
@@ -28,8 +27,7 @@ def main() -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from pkmcal.cli import ending
 
-    if hasattr(signal, "SIGPIPE"):
-        signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # `pkmcal … | head` ends as others do
+    interrupt.ends_with_its_reader()
     if sys.stderr is None:  # closed, as services have it, and pythonw
         sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
     if isinstance(sys.stdout, io.TextIOWrapper):

@@ -34,17 +34,21 @@ class Served:
         return int(self.url.split(":")[2].partition("/")[0])
 
 
+# the command itself, for it decides what signals do; with operations for tests
+_PROGRAM = (
+    "from functools import partial; from pkmcal.app import launch as it;"
+    "it.launch = partial(it.launch, testing=True);"
+    "from pkmcal.cli.main import main; main()"
+)
+
+
 @contextmanager
-def served(folder: Path) -> Iterator[Served]:
-    """Serve a folder, with operations for tests, until the end of the block."""
-    code = (
-        "import sys, pathlib; from pkmcal.app.launch import launch;"
-        "launch(pathlib.Path(sys.argv[1]), lambda text: print(text, flush=True), browser=False,"
-        " testing=True)"
-    )
+def served(folder: Path, stderr: int | None = None) -> Iterator[Served]:
+    """Serve a folder as `pkmcal app` does until the end of the block."""
     with subprocess.Popen(
-        [sys.executable, "-c", code, str(folder)],
+        [sys.executable, "-c", _PROGRAM, "app", str(folder), "--no-browser"],
         stdout=subprocess.PIPE,
+        stderr=stderr,
         text=True,
         env={**os.environ, "PYTHONUNBUFFERED": "1"},
     ) as process:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import shutil
+import sys
 from pathlib import Path
 
 import pytest
@@ -118,3 +120,28 @@ def test_a_folder_is_claimed_once_at_a_time(tmp_path: Path) -> None:
         pass
     with claimed(tmp_path):
         pass
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there it cannot be renamed")
+def test_another_folder_by_its_name_is_not_taken_for_it(tmp_path: Path) -> None:
+    """The processes of a window are in the folder that was there, and go on to read that."""
+    folder = Folder(tmp_path / "project")
+    assert folder.change(HEXAPOD, 1)
+    shutil.copytree(folder.path, tmp_path / "copy")
+    folder.path.rename(tmp_path / "former")
+    (tmp_path / "copy").rename(folder.path)
+    for what in (folder.follow, lambda: folder.change(DELTA, 2), lambda: folder.undo(2)):
+        with pytest.raises(pk.Error, match="another folder has this name now"):
+            what()
+    assert "hexapod" in (folder.path / "project.toml").read_text()
+    folder.path.rename(tmp_path / "copy")
+    (tmp_path / "former").rename(folder.path)
+    assert folder.change(DELTA, 2)
+
+
+@pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="no Linux")
+def test_a_folder_that_is_not_needed_any_more_is_not_held_open(tmp_path: Path) -> None:
+    before = len(os.listdir("/proc/self/fd"))
+    for _ in range(20):
+        Folder(tmp_path)
+    assert len(os.listdir("/proc/self/fd")) <= before + 1

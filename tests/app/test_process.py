@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import asyncio
 import http.client
 import json
+import os
+import signal
 import subprocess
 import sys
 import time
@@ -15,6 +18,8 @@ import pytest
 
 pytest.importorskip("starlette", reason="the extra app is not installed")
 pytest.importorskip("uvicorn", reason="the extra app is not installed")
+
+from pkmcal.app.process import Worker
 
 from . import browser
 from .test_guard import ask, state
@@ -131,6 +136,43 @@ def test_a_server_that_is_ended_ends_what_it_started(tmp_path: Path) -> None:
         assert gone(worker) and gone(spare)
 
 
+@pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="of terminals elsewhere")
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_a_terminal_that_is_closed_ends_the_server_in_order(tmp_path: Path, name: str) -> None:
+    with browser.served(tmp_path / "project", stderr=subprocess.PIPE) as served:
+        take_hexapod(served)
+        lines(served, "machine")
+        worker, spare = health(served)["worker"], spare_of(served)
+        headers = {"x-pkmcal-token": served.token}
+        with closing(http.client.HTTPConnection("127.0.0.1", served.port, timeout=30)) as tab:
+            tab.request("GET", "/api/events", headers=headers)
+            tab.getresponse().readline()
+            number = signal.Signals[name]
+            served.process.send_signal(number)
+            said = "Ctrl-C" if name == "SIGINT" else name
+            assert served.process.communicate(timeout=20)[1] == f"pkmcal: stopped by {said}\n"
+        assert served.process.returncode == 128 + number
+        assert gone(worker) and gone(spare)
+    assert not list(served.folder.glob(".*"))
+
+
+def test_a_request_that_does_not_end_holds_no_server_and_is_no_error(tmp_path: Path) -> None:
+    """Of a file that is given half, as on a busy computer, nothing is kept or said."""
+    with browser.served(tmp_path / "project", stderr=subprocess.PIPE) as served:
+        state(served)
+        with closing(http.client.HTTPConnection("127.0.0.1", served.port, timeout=30)) as tab:
+            tab.putrequest("PUT", "/api/file/half.csv")
+            tab.putheader("x-pkmcal-token", served.token)
+            tab.putheader("content-length", "1000")
+            tab.endheaders(b"q1 [mm],x [mm]\n")
+            end = time.monotonic() + 20
+            while not list(served.folder.glob(".upload*")) and time.monotonic() < end:
+                time.sleep(0.02)
+            served.process.send_signal(signal.SIGINT)
+            assert served.process.communicate(timeout=20)[1] == "pkmcal: stopped by Ctrl-C\n"
+    assert not list(served.folder.glob("*half*")) and not list(served.folder.glob(".*"))
+
+
 def test_a_process_that_waits_takes_the_place_of_one_that_is_ended(tmp_path: Path) -> None:
     with browser.served(tmp_path / "project") as served:
         take_hexapod(served)
@@ -187,7 +229,39 @@ def test_what_a_killed_upload_left_is_removed(tmp_path: Path) -> None:
         assert not (folder / ".upload-abc.part").exists() and (folder / "mine.part").exists()
 
 
-def test_the_server_itself_computes_nothing(tmp_path: Path) -> None:
+def test_the_server_itself_computes_nothing() -> None:
+    code = "import pkmcal.app.launch, sys; print({'numpy', 'pkmcal._core'} & set(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "set()"
+
+
+def test_a_process_that_is_killed_unseen_ends_no_server(tmp_path: Path) -> None:
+    """Before the server knows it, it writes into a pipe that nobody reads."""
     with browser.served(tmp_path / "project") as served:
-        maps = Path(f"/proc/{served.process.pid}/maps").read_text()
-        assert "numpy" not in maps and "_core" not in maps
+        take_hexapod(served)
+        for _ in range(5):
+            os.kill(health(served)["worker"], signal.SIGKILL)
+            last = lines(served, "machine")[-1]
+            assert "result" in last or last["error"]["crashed"]
+        assert served.process.poll() is None
+        assert "result" in lines(served, "machine")[-1]
+
+
+def test_a_request_that_is_left_twice_does_not_hand_its_dying_process_on(tmp_path: Path) -> None:
+    """As by a tab that presses Stop and closes the stream."""
+
+    async def answer() -> dict[str, Any]:
+        worker = Worker(tmp_path)
+        try:
+            messages = worker.run("wait", state={}, given={})
+            await anext(messages)
+            following = asyncio.ensure_future(anext(messages))
+            for _ in range(2):
+                await asyncio.sleep(0)
+                following.cancel()
+            *_, last = [each async for each in worker.run("devices", state={}, given={})]
+            return last
+        finally:
+            await worker.stop()
+
+    assert "result" in asyncio.run(answer())

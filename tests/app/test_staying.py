@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import signal
 from pathlib import Path
 from typing import Any
 
@@ -68,6 +69,20 @@ def test_the_firmware_is_asked_for_where_a_file_does_not_show_it(tmp_path: Path)
         page.locator(".pkmcal-view.moves").wait_for()
         assert page.evaluate("document.activeElement.value") == "reprap"
         assert "--from reprap" in page.locator("#terminal pre").inner_text()
+
+
+def test_a_long_name_of_a_file_makes_no_page_wider_than_its_window(tmp_path: Path) -> None:
+    size = {"width": 320, "height": 640}
+    with (
+        browser.served(tmp_path / "project") as served,
+        browser.page_of(served, viewport=size) as page,
+    ):
+        take_hexapod(page)
+        drop(page, "without_any_space_" * 5 + ".csv", POINTS)
+        page.locator("#said", has_text="measurements").wait_for()
+        page.get_by_role("button", name="3 Measure").click()
+        page.get_by_label("Quality is", exact=True).wait_for()
+        assert page.evaluate("document.documentElement.scrollWidth") == 320
 
 
 def test_headings_are_named_one_after_the_other_without_losing_the_place(tmp_path: Path) -> None:
@@ -169,7 +184,19 @@ def test_a_server_that_ends_is_told_in_words(tmp_path: Path) -> None:
     with browser.served(tmp_path / "project") as served, browser.page_of(served, "ERR_") as page:
         take_hexapod(page)
         served.process.terminate()
-        page.locator("#trouble", has_text="start pkmcal app there again").wait_for()
+        page.locator("#trouble", has_text=f"pkmcal app {served.folder}").wait_for()
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="halts it as a terminal does")
+def test_a_server_that_is_halted_is_told_until_it_goes_on(tmp_path: Path) -> None:
+    with browser.served(tmp_path / "project") as served, browser.page_of(served) as page:
+        take_hexapod(page)
+        served.process.send_signal(signal.SIGSTOP)
+        page.get_by_role("button", name="tricept", exact=True).click()
+        page.locator("#trouble", has_text="goes on there by fg").wait_for()
+        served.process.send_signal(signal.SIGCONT)
+        page.locator("h2", has_text="tricept").first.wait_for()
+        assert not page.locator("#trouble").is_visible()
 
 
 def test_what_is_dropped_twice_with_another_content_is_kept_twice(tmp_path: Path) -> None:
@@ -191,6 +218,31 @@ def test_a_project_that_is_edited_beside_the_window_is_shown_as_it_is(tmp_path: 
         page.locator("#trouble", has_text="do it again").wait_for()
         page.locator("h2", has_text="linear delta").first.wait_for()
         assert "linear-delta" in file.read_text()
+
+
+def test_what_was_edited_beside_the_window_is_what_all_of_a_screen_shows(tmp_path: Path) -> None:
+    """A fit takes it over, and so do boxes, choices and the lines for a terminal."""
+    with browser.served(tmp_path / "project") as served, browser.page_of(served) as page:
+        page.set_input_files("input[type=file]", PRINTER)
+        page.get_by_role("button", name="Calibrate with what it has stored").click()
+        fits(page, 1)
+        file = served.folder / "project.toml"
+        file.write_text(file.read_text() + '\n[fit]\ndrop = ["3"]\nholdout = "0.2"\n')
+        page.get_by_role("button", name="4 Result").click()
+        page.locator("#terminal pre", has_text="--holdout 0.2 --drop 3").wait_for()
+        page.locator(".verdict .state", has_text="8 held-out points").wait_for()
+        page.locator("main.result[aria-busy=false]").wait_for()
+        assert page.get_by_label("hold out").input_value() == "0.2"
+        assert not page.locator("tr[id='row 3'] input").is_checked()
+
+
+def test_who_comes_back_from_an_editor_sees_what_was_written(tmp_path: Path) -> None:
+    with browser.served(tmp_path / "project") as served, browser.page_of(served) as page:
+        take_hexapod(page)
+        file = served.folder / "project.toml"
+        file.write_text(file.read_text().replace("hexapod", "linear-delta"))
+        page.evaluate("dispatchEvent(new Event('focus'))")
+        page.locator("h2", has_text="linear delta").first.wait_for()
 
 
 def test_a_project_of_the_former_folder_is_the_same(tmp_path: Path) -> None:

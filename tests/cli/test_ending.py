@@ -139,7 +139,6 @@ def test_ctrl_c_while_the_verbs_are_loaded_is_130_and_one_line(tmp_path: Path) -
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     try:
         assert running.stdout is not None and running.stdout.readline() == "here\n"
@@ -167,7 +166,6 @@ def test_ctrl_c_while_the_command_line_is_read_is_130_and_one_line(step: str) ->
         [sys.executable, "-c", program, "machines"],
         capture_output=True,
         text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     assert (done.returncode, done.stderr) == (130, "pkmcal: stopped by Ctrl-C\n")
 
@@ -187,7 +185,6 @@ def test_ctrl_c_at_any_moment_leaves_no_traceback(tmp_path: Path) -> None:
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
-            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
         )
         assert running.stdout is not None and running.stdout.readline() == "here\n"
         time.sleep(delay)

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from pkmcal.cli.interrupt import IsRaised, Stopped
 from pkmcal.files import atomic
 from pkmcal.files.atomic import write_whole
 
@@ -42,8 +43,6 @@ def ended_by(number: int, code: str, arguments: list[str], folder: Path, after: 
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        # a shell that starts the tests in the background has them ignore signals
-        preexec_fn=lambda: signal.signal(number, signal.SIG_DFL),
     )
     try:
         assert process.stdout is not None and process.stdout.readline() == "ready\n"
@@ -103,3 +102,25 @@ def test_interrupt_while_a_file_is_written_leaves_the_old_one(
         write_whole(tmp_path / "robot.toml", "new and longer")
     assert [path.name for path in tmp_path.iterdir()] == ["robot.toml"]
     assert (tmp_path / "robot.toml").read_text() == "old"
+
+
+class Asks:
+    """An object that a signal meets while Python tidies it up."""
+
+    def __init__(self, number: int) -> None:
+        self.number = number
+
+    def __del__(self) -> None:
+        signal.raise_signal(self.number)
+        time.sleep(0.0)  # here the handler runs
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_is_not_lost_that_comes_while_an_object_is_tidied_up(number: int) -> None:
+    """There Python prints what is raised, and goes on: a server had not ended."""
+    begun = time.monotonic()
+    with IsRaised(), pytest.raises(Stopped) as stopped:
+        Asks(number)
+        time.sleep(30.0)
+    assert stopped.value.number == number
+    assert time.monotonic() - begun < 30.0

@@ -7,6 +7,12 @@ for (const { dataset: { step } } of STEPS) app.screens[step] = async main => (aw
 window.workbench = app // what tests ask
 addEventListener('unhandledrejection', event => trouble(event.reason?.message ?? String(event.reason)))
 
+const HALTED = 'The server of this window does not answer. If it was halted in its terminal, as by Ctrl-Z, it goes on there by fg; nothing is lost.'
+addEventListener('silent', ({ detail }) => {
+  if (detail) trouble(HALTED)
+  else if ($('trouble').textContent === HALTED) trouble()
+})
+
 const stepOf = hash => STEPS.find(one => `#${one.dataset.step}` === hash)?.dataset.step
 addEventListener('popstate', () => app.project && go(stepOf(location.hash) ?? 'machine', true, true))
 
@@ -38,11 +44,18 @@ attempt(async () => {
 // Show what other tabs change.
 async function follow() {
   for await (const version of server.changes()) {
-    if (version <= app.project.version) continue
-    newest(await server.state())
-    refresh()
+    if (version > app.project.version) await look()
   }
-  throw Error(server.ENDED)
+  throw server.ended()
+}
+
+// Who comes back from an editor sees what was written there.
+addEventListener('focus', () => app.project && look().catch(() => {})) // a server that ended has said so
+
+async function look() {
+  const { version } = app.project
+  newest(await server.state())
+  if (version < app.project.version) refresh()
 }
 
 // Answers may come late: none takes the place of a newer one.
@@ -80,7 +93,7 @@ async function settled(changed) {
   if (failed || late) await refresh() // what was ticked or typed is not so
   else frame()
   if (failed) throw failed
-  if (late) trouble('Another tab changed the project. This one now shows it as it is: do it again if you still want to.')
+  if (late) trouble('The project was changed elsewhere, in another tab or in its file. This window now shows it as it is: do it again if you still want to.')
   return !late
 }
 

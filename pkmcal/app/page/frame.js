@@ -80,7 +80,7 @@ export async function work(operation, words, given, own = {}) {
       if (message.error) throw Object.assign(Error(message.error.message), message.error)
       if (message.result) return message.result
     }
-    throw Error('the server ended')
+    throw server.ended()
   } catch (error) {
     throw own.ended ?? error
   } finally {

@@ -127,7 +127,7 @@ async function measured(asked) {
       if (message.error?.stopped) told.textContent = message.error.message
       else if (message.error) throw Error(message.error.message)
     }
-    if (!over) throw Error(server.ENDED)
+    if (!over) throw server.ended()
   } finally {
     running = null
     removeEventListener('beforeunload', leaving)

@@ -107,9 +107,13 @@ function columns(parent, { columns, meanings, units }) {
     made('tr', table, {}, ...['heading', 'is', 'unit', 'as it was read'].map(text => made('th', null, { text, scope: 'col' })))
     for (const { heading } of mine) {
       const line = made('tr', table), cell = cells[`${name} ${heading}`] = {}
+      const onchange = () => {
+        const is = cell.is.value.trim(), unit = cell.unit.value // an answer that comes before its turn may change the fields
+        return edit(m => means(m, heading, is, unit))
+      }
       made('td', line, { text: heading })
-      cell.is = made('input', made('td', line), { list: 'meanings', size: 12, placeholder: 'as it says', 'aria-label': `${heading} is`, onchange: () => edit(m => means(m, heading, cell)) })
-      cell.unit = made('select', made('td', line), { 'aria-label': `unit of ${heading}`, onchange: () => edit(m => means(m, heading, cell)) })
+      cell.is = made('input', made('td', line), { list: 'meanings', size: 12, placeholder: 'as it says', 'aria-label': `${heading} is`, onchange })
+      cell.unit = made('select', made('td', line), { 'aria-label': `unit of ${heading}`, onchange })
       for (const unit of ['', ...units]) made('option', cell.unit, { value: unit, text: unit || 'as stated' })
       cell.said = made('td', line, { className: 'note' })
     }
@@ -131,13 +135,12 @@ function columns(parent, { columns, meanings, units }) {
 
 const LEFT_OUT = 'leave out'
 
-function means(measured, heading, { is, unit }) {
-  const named = is.value.trim()
+function means(measured, heading, named, unit) {
   measured.ignore = (measured.ignore ?? []).filter(one => one !== heading)
   measured.rename = { ...measured.rename }
   delete measured.rename[heading]
   if (named === LEFT_OUT) measured.ignore.push(heading)
-  else if (named || unit.value) measured.rename[heading] = (named || heading) + (unit.value ? ` [${unit.value}]` : '')
+  else if (named || unit) measured.rename[heading] = (named || heading) + (unit ? ` [${unit}]` : '')
   if (!measured.ignore.length) delete measured.ignore
   if (!Object.keys(measured.rename).length) delete measured.rename
 }

@@ -8,17 +8,28 @@ addEventListener('hashchange', () => location.hash.startsWith('#t=') && location
 const tab = crypto.randomUUID()
 const headers = { 'x-pkmcal-token': localStorage.getItem('token') ?? '', 'x-pkmcal-tab': tab }
 
-export const ENDED = 'The server of this window does not answer: it was ended in its terminal. What was shown is kept in its folder; start pkmcal app there again.'
+let again = 'pkmcal app' // what starts it again
+export const ended = () => Error(`The server of this window does not answer: it has ended, as by Ctrl-C in its terminal. Your project is kept in its folder. To go on, type in a terminal: ${again}`)
+
+const PATIENCE = 5000 // ms for the head of an answer; a large file takes its time
 
 async function ask(path, settings = {}) {
-  const answer = await fetch(path, { ...settings, headers }).catch(() => { throw Error(settings.method === 'PUT' ? `This cannot be read, or the server ended: ${settings.body.name}` : ENDED) })
+  const silent = now => dispatchEvent(new CustomEvent('silent', { detail: now }))
+  const late = settings.method === 'PUT' ? 0 : setTimeout(() => silent(true), PATIENCE)
+  const answer = await fetch(path, { ...settings, headers }).finally(() => { clearTimeout(late); silent(false) }).catch(() => { throw settings.method === 'PUT' ? Error(`This cannot be read, or the server ended: ${settings.body.name}`) : ended() })
   if (answer.status === 401) throw Error('This page has no right to this server: open it from the terminal again.')
   if (!answer.ok && (answer.status !== 409 || path.startsWith('/api/live'))) throw Error((await answer.json().catch(() => ({}))).error ?? `${answer.status}`)
   return answer
 }
 
 const post = (path, data, signal) => ask(path, { method: 'POST', body: JSON.stringify(data ?? {}), signal })
-export const state = async () => (await ask('/api/state')).json()
+
+export async function state() {
+  const answer = await (await ask('/api/state')).json()
+  again = answer.again
+  return answer
+}
+
 export const core = async kind => packed(await (await ask(`/wasm/${kind}`)).arrayBuffer())
 export const cancel = job => post(`/api/cancel/${job}`)
 
