@@ -52,13 +52,19 @@ def dh(
     require_plain(instance("arm", arm, SerialArm), "a table of Denavit-Hartenberg numbers")
     table = arm.dh(convention, parallel)
     leaning = table.beta is not None and bool(table.beta.any())
+    names = arm.joint_names or tuple(str(i + 1) for i in range(arm.n_joints))
+    followed = "".join(
+        f"# joint {names[joint - 1]} moves by {by!r} times joint {names[leader - 1]}"
+        + (", mm or rad\n" if arm.kinds[joint - 1] != arm.kinds[leader - 1] else "\n")
+        for joint, leader, by in arm.followers.ratios
+    )
     comment = (
         f"# {_line(arm.name)}: {convention} Denavit-Hartenberg numbers,"
         f" {_ORDER[convention][leaning]} a row\n"
         + _matrix("base, the first frame in it", table.base)
         + _matrix("tool, in the last frame", table.tool)
+        + followed
     )
-    names = arm.joint_names or tuple(str(i + 1) for i in range(arm.n_joints))
     degrees = np.degrees([table.alpha, table.theta])
     columns = [table.a, degrees[0], table.d, degrees[1]]
     heads = ["joint", "kind", "a [mm]", "alpha [deg]", "d [mm]", "theta [deg]"]
@@ -103,7 +109,7 @@ def universal_robots(arm: SerialArm, path: str | PathLike[str]) -> DHTable:
         Another arm, or one whose numbers are not of the form of these robots.
     """
     require_plain(instance("arm", arm, SerialArm), "a calibration.conf")
-    if arm.kinds != ("revolute",) * _UR_JOINTS:
+    if arm.kinds != ("revolute",) * _UR_JOINTS or arm.followers:
         raise ArgumentError(f"{arm.name}: these robots have six turning joints")
     nominal, real = arm.replace(np.zeros((_UR_JOINTS, 6))).dh(), arm.dh()
     if np.abs(nominal.theta).max() > _MOVED:

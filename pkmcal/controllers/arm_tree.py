@@ -35,6 +35,8 @@ class TreeJoint(NamedTuple):
         None: it is fixed.
     slides : bool
         Whether it is prismatic.
+    follows : (str, float) or None
+        A joint that it follows, and m or rad by m or rad of that one.
     """
 
     name: str
@@ -43,6 +45,7 @@ class TreeJoint(NamedTuple):
     origin: FloatArray
     axis: FloatArray | None
     slides: bool
+    follows: tuple[str, float] | None = None
 
 
 def require_arm(arm: object, format: str) -> SerialArm:
@@ -68,16 +71,37 @@ def joints(arm: SerialArm) -> Iterator[TreeJoint]:
     """The joints from the base to the tool, joint errors in their origins."""
     before = np.eye(4)
     parent = "base"
-    names = arm.joint_names or [f"q{i}" for i, _ in enumerate(arm.kinds, 1)]
+    names = arm.joint_names or _numbered(arm)
+    follows = {
+        ratio.joint: (
+            names[ratio.leader - 1],
+            ratio.by * _metres(arm, ratio.joint) / _metres(arm, ratio.leader),
+        )
+        for ratio in arm.followers.ratios
+    }
     numbers = zip(arm.axes, arm.points, arm.kinds, arm.error_motions(), strict=True)
     for i, (axis, point, kind, error) in enumerate(numbers, 1):
         at = np.eye(4)
         at[:3, 3] = point
         origin = _origin(np.linalg.inv(before) @ error @ at)
-        yield TreeJoint(names[i - 1], parent, f"link{i}", origin, axis, kind == "prismatic")
+        slides, led = kind == "prismatic", follows.get(i)
+        yield TreeJoint(names[i - 1], parent, f"link{i}", origin, axis, slides, led)
         parent, before = f"link{i}", at
     tool = _origin(np.linalg.inv(before) @ arm.home)
     yield TreeJoint("tool", parent, "tool", tool, None, False)
+
+
+def _numbered(arm: SerialArm) -> list[str]:
+    """Names of joints: of the k-th that is commanded qk, of one that follows its own number."""
+    names = [f"joint{i}" for i in range(1, arm.n_joints + 1)]
+    for k, joint in enumerate(arm.followers.driven, 1):
+        names[joint] = f"q{k}"
+    return names
+
+
+def _metres(arm: SerialArm, joint: int) -> float:
+    """Return what 1 mm or 1 rad of a joint, counted from 1, is in m or rad."""
+    return MILLIMETRE if arm.kinds[joint - 1] == "prismatic" else 1.0
 
 
 def _origin(motion: FloatArray) -> FloatArray:

@@ -10,7 +10,7 @@ from pkmcal.exceptions import FileError
 from pkmcal.geometry.controller import FIRMWARES
 
 Firmware = Literal["klipper", "reprap", "marlin", "hangprinter", "maslow"]
-_MASLOW = re.compile(r"MaslowKinematics|Maslow_[tb][lr][XY]=|CLBM:\[")
+_MASLOW = re.compile(r"MaslowKinematics|Maslow_[tb][lr][XY][ \t]*[:=]|CLBM:\[")
 _SECTION = re.compile(r"^\[(?:printer|stepper_[abc])\]", re.MULTILINE)
 _LISTED = re.compile(r"^[^;\r\n]*\becho:", re.MULTILINE)  # as M503 of Marlin lists settings
 _OF_REPRAP = ("G31", "M98", "M558", "M574", "M584")

@@ -97,7 +97,7 @@ def laws(arm: SerialArm) -> Loss:
     most = np.where(turning, np.pi, arm.length)
     low = np.where(np.isfinite(limits[:, 0]), limits[:, 0], -most)
     high = np.where(np.isfinite(limits[:, 1]), limits[:, 1], most)
-    theta = low + (high - low) * np.random.default_rng(0).random((COMPARED, arm.n_joints))
+    theta = low + (high - low) * np.random.default_rng(0).random((COMPARED, arm.n_actuators))
     off = (arm.forward(theta) - arm.rigid.forward(theta))[:, :3, 3]
     return Loss.of(off, "by what its joints add to their commands")
 

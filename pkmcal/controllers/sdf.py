@@ -22,6 +22,7 @@ from pkmcal.controllers.arm_tree import (
     text_of,
     xml_of,
 )
+from pkmcal.exceptions import ArgumentError
 from pkmcal.files.atomic import write_whole
 
 _VERSION = "1.7"  # the first with poses relative to joints
@@ -45,7 +46,7 @@ def sdf(arm: SerialArm, path: str | PathLike[str]) -> None:
     Raises
     ------
     ValueError
-        A parallel machine: it has loops.
+        A parallel machine: it has loops. An arm with joints that follow others.
 
     Examples
     --------
@@ -57,6 +58,11 @@ def sdf(arm: SerialArm, path: str | PathLike[str]) -> None:
     3
     """
     arm = require_arm(arm, "an SDF model")
+    if arm.followers:
+        raise ArgumentError(
+            f"robot: joint {arm.followers.ratios[0].joint} of {arm.name} follows others, which"
+            f" SDFormat {_VERSION} does not hold; a URDF does: --as urdf"
+        )
     top = Xml.Element("sdf", version=_VERSION)
     model = Xml.SubElement(top, "model", name=arm.name.replace("::", " "))
     _link(model, "base", "__model__")

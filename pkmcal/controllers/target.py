@@ -8,10 +8,19 @@ from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from pkgutil import resolve_name
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Literal
 
-from pkmcal.arguments import shown, word
-from pkmcal.exceptions import ArgumentError, ArgumentTypeError
+from pkmcal import arguments
+from pkmcal.arguments import instance, shown, word
+from pkmcal.exceptions import (
+    ArgumentError,
+    ArgumentTypeError,
+    Error,
+    named_failures,
+    of_the_package,
+)
+from pkmcal.files.atomic import write_whole
 
 if TYPE_CHECKING:
     from pkmcal.controllers.loss import Loss
@@ -78,6 +87,8 @@ class Target:
         if not (callable(self.write) or isinstance(self.write, str)):
             raise ArgumentTypeError(f"write must be a function, found {shown(self.write)}")
         word("takes", self.takes, ("parallel", "arm", "any"))
+        for member in ("about", "label", "file", "said"):
+            instance(f"{member} of the target {self.name}", getattr(self, member), str)
         if not self.file:
             object.__setattr__(self, "file", f"for_{self.name}.txt")
 
@@ -86,7 +97,12 @@ class Target:
         """The function that writes."""
         if callable(self.write):
             return self.write
-        found: Callable[..., Any] = resolve_name(self.write)
+        try:
+            found: Callable[..., Any] = resolve_name(self.write)
+        except (ImportError, AttributeError, ValueError) as error:
+            raise ArgumentError(
+                f"the target {self.name}: its function {self.write!r} cannot be had: {error}"
+            ) from error
         return found
 
     @property
@@ -105,7 +121,8 @@ class Target:
         machine : Robot or SerialArm
             One that it takes.
         path : path
-            The file, or the folder.
+            The file, or the folder. What was there before stays until the function has written
+            the whole, elsewhere.
         options : mapping, optional
             Values of `options`.
 
@@ -117,16 +134,52 @@ class Target:
         Raises
         ------
         ValueError
-            What the target cannot hold.
+            What the target cannot hold, or does not take; a function that is no part of pkmcal
+            failed, or did not write what its target states.
+        TypeError
+            A path that is none.
+        OSError
+            What was written cannot be moved to its place.
         """
         from pkmcal.arms.arm import SerialArm
         from pkmcal.controllers.loss import Loss, laws
+        from pkmcal.kinematics.calibratable import as_machine
 
+        if self.takes not in (kind := as_machine(machine).kind, "any"):
+            found = "a serial arm" if kind == "arm" else "a parallel machine"
+            wanted = "serial arms" if self.takes == "arm" else "parallel machines"
+            raise ArgumentError(f"the target {self.name} is for {wanted}, found {found}")
         lost = None
         if isinstance(machine, SerialArm):
             lost = None if machine.laws is None else laws(machine)
             machine = machine.rigid
-        found = self.writer(machine, path, **(options or {}))
-        if not Path(path).exists():
-            raise ArgumentError(f"the target {self.name} wrote no {Path(path).name}")
+        place = arguments.path("path", path)
+        if self.folder and place.exists() and not place.is_dir():
+            raise ArgumentError(f"{place}: the target {self.name} writes a folder, this is a file")
+        with TemporaryDirectory(prefix="pkmcal-") as folder:
+            draft = Path(folder) / place.resolve().name
+            found = self._written(machine, draft, options or {})
+            for each in sorted(Path(folder).rglob("*")):
+                to = place.parent / each.relative_to(folder)
+                if each.is_dir():
+                    to.mkdir(parents=True, exist_ok=True)
+                else:
+                    write_whole(to, each.read_bytes())
         return found if isinstance(found, Loss) else lost
+
+    def _written(self, machine: Any, draft: Path, options: Mapping[str, Any]) -> Any:
+        """Have the function write where nothing is, and return what it returns."""
+        writer, said = self.writer, f"the target {self.name}"
+        with named_failures(writer, said, files=True):
+            try:
+                found = writer(machine, draft, **options)
+            except ValueError as error:  # what it cannot hold
+                if isinstance(error, Error) or of_the_package(writer):
+                    raise
+                raise ArgumentError(f"{said}: {error}") from error
+        if not draft.exists():
+            raise ArgumentError(f"{said} wrote no {draft.name}")
+        if draft.is_dir() != self.folder:
+            wrote, states = ("file", "True") if self.folder else ("folder", "False")
+            raise ArgumentError(f"{said} wrote a {wrote} {draft.name}, and states folder={states}")
+        return found

@@ -19,6 +19,7 @@ from pkmcal.controllers.arm_tree import (
     text_of,
     xml_of,
 )
+from pkmcal.exceptions import ArgumentError
 from pkmcal.files.atomic import write_whole
 
 
@@ -40,7 +41,7 @@ def urdf(arm: SerialArm, path: str | PathLike[str]) -> None:
     Raises
     ------
     ValueError
-        A parallel machine: a URDF is a tree.
+        A parallel machine: a URDF is a tree. An arm with a joint that follows several others.
 
     Examples
     --------
@@ -54,6 +55,13 @@ def urdf(arm: SerialArm, path: str | PathLike[str]) -> None:
     True
     """
     arm = require_arm(arm, "a URDF")
+    led = [ratio.joint for ratio in arm.followers.ratios]
+    if len(set(led)) < len(led):
+        several = next(joint for joint in led if led.count(joint) > 1)
+        raise ArgumentError(
+            f"robot: joint {several} of {arm.name} follows several joints, and <mimic> of a URDF"
+            " follows one"
+        )
     top = Xml.Element("robot", name=arm.name)
     Xml.SubElement(top, "link", name="base")
     for joint in joints(arm):
@@ -79,6 +87,9 @@ def _add(top: Xml.Element, joint: TreeJoint) -> None:
     Xml.SubElement(element, "origin", origin)
     if joint.axis is not None:
         Xml.SubElement(element, "axis", xyz=text_of(joint.axis))
+    if joint.follows is not None:
+        leader, by = joint.follows
+        Xml.SubElement(element, "mimic", joint=leader, multiplier=repr(by))
     if joint.slides:
         limit = {"lower": "-1000", "upper": "1000", "effort": "0", "velocity": "0"}
         Xml.SubElement(element, "limit", limit)

@@ -18,7 +18,7 @@ from pkmcal.files.csv_writer import WrittenColumn, write_csv
 from pkmcal.readings.boards import Board
 from pkmcal.readings.camera import Camera
 from pkmcal.result import Result
-from pkmcal.vision.detectors import NOTHING, Finder, finder, opencv
+from pkmcal.vision.detectors import NOTHING, Finder, family_of, finder, opencv
 from pkmcal.vision.pictures import (
     FEWEST,
     Picture,
@@ -180,14 +180,12 @@ def detect(
         function("progress", progress)
     paths = files(images)
     finds = finder(board)
-    pictures, contents = list[Picture](), dict[bytes, str]()
+    pictures, twins = list[Picture](), _twins(paths)
     for file in paths:
-        content = file.read_bytes()
-        first = contents.setdefault(sha256(content).digest(), file.name)
-        if first != file.name:
-            pictures.append(Picture(file, NOTHING, f"the same picture as {first}"))
+        if file in twins:
+            pictures.append(Picture(file, NOTHING, f"the same picture as {twins[file]}"))
         else:
-            pictures.append(looked_at(file, grey(file, content), finds))
+            pictures.append(looked_at(file, grey(file, file.read_bytes()), finds))
         if progress is not None:
             progress(len(pictures), len(paths))
     pictures = of_one_size(pictures)
@@ -197,6 +195,15 @@ def detect(
     return replace(found, remarks=tuple(_remarks(found, board, tilts, finds)))
 
 
+def _twins(paths: Sequence[Path]) -> dict[Path, str]:
+    """Files of the same bytes as others, with the name of one: of which joints it is none tells."""
+    alike = dict[bytes, list[Path]]()
+    for file in paths:
+        alike.setdefault(sha256(file.read_bytes()).digest(), []).append(file)
+    several = [each for each in alike.values() if len(each) > 1]
+    return {file: each[file == each[0]].name for each in several for file in each}
+
+
 def _remarks(found: Detection, board: Board, tilts: FloatArray, finds: Finder) -> Iterator[str]:
     """List remarks on all pictures together."""
     if not found.taken:
@@ -204,6 +211,22 @@ def _remarks(found: Detection, board: Board, tilts: FloatArray, finds: Finder) -
             yield (
                 "the pictures are mirrored: the board is found in their mirror images; take them"
                 " without mirroring, which no lens describes"
+            )
+        elif _seen_exchanged(found.pictures, board):
+            columns, rows = board.shape
+            yield (
+                f"a board of {rows}x{columns} is found: state the columns before the rows, as they"
+                " were printed"
+            )
+        elif board.dictionary and (family := _family(found.pictures)):
+            kind = family.rpartition("_")[0]
+            own = board.dictionary == family or (
+                board.dictionary.startswith(f"{kind}_") and "X" in kind
+            )
+            asked = "shape, and the order of its markers," if own else "dictionary"
+            yield (
+                f"markers of {family} are found, but no board of {board.shape[0]}x{board.shape[1]}"
+                f" with {board.dictionary}: state the {asked} that was printed"
             )
         return
     pixel, size = found.pixel, np.array(found.taken[0].size)
@@ -242,8 +265,26 @@ def _area(pixel: FloatArray) -> float:
 
 def _seen_in_a_mirror(pictures: Sequence[Picture], finds: Finder) -> bool:
     """Return whether the first picture that shows no board shows one from behind."""
+    return _first_shows(pictures, lambda levels: finds(np.ascontiguousarray(levels[:, ::-1])))
+
+
+def _seen_exchanged(pictures: Sequence[Picture], board: Board) -> bool:
+    """Return whether the first picture that shows no board shows one of as many rows as columns."""
+    other = replace(board, shape=board.shape[::-1])
+    return other.shape != board.shape and _first_shows(pictures, finder(other))
+
+
+def _family(pictures: Sequence[Picture]) -> str:
+    """The dictionary of the markers in the first picture that shows no board; "" of none."""
     for each in pictures:
         if each.bad.startswith("no board"):
-            levels = grey(each.path, each.path.read_bytes())
-            return len(finds(np.ascontiguousarray(levels[:, ::-1])).ids) >= FEWEST
+            return family_of(grey(each.path, each.path.read_bytes()))
+    return ""
+
+
+def _first_shows(pictures: Sequence[Picture], finds: Finder) -> bool:
+    """Return whether corners are found in the first picture that shows no board."""
+    for each in pictures:
+        if each.bad.startswith("no board"):
+            return len(finds(grey(each.path, each.path.read_bytes())).ids) >= FEWEST
     return False

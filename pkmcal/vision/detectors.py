@@ -22,6 +22,12 @@ from pkmcal.readings.boards import Board
 _WINDOW = 5  # half the side of the square in which a corner is refined, px
 _SHARE = 0.25  # of the way to the next corner that it may reach
 _LARGER = 1.4  # than its neighbours, of a dot that tells how the board is turned
+# Each holds its smaller ones; the least of AprilTags is found in noise.
+_FAMILIES = (
+    "4X4_1000", "5X5_1000", "6X6_1000", "7X7_1000", "ARUCO_ORIGINAL", "APRILTAG_25h9",
+    "APRILTAG_36h10", "APRILTAG_36h11",
+)  # fmt: skip
+_MARKERS = 6  # of one dictionary, that no noise has
 _PUPIL = (1, 0, 3, 2)  # its order of a tag's corners, as a tag of OpenCV is drawn
 
 
@@ -91,6 +97,17 @@ def dictionary(board: Board) -> Any:
         hint = did_you_mean(board.dictionary, known)
         raise ArgumentError(f"board: OpenCV has no dictionary {board.dictionary!r}{hint}")
     return aruco.getPredefinedDictionary(getattr(aruco, known[board.dictionary]))
+
+
+def family_of(grey: Any) -> str:
+    """The dictionary of most markers in a picture; "" where no six are of one."""
+    aruco, counts = opencv().aruco, dict[str, int]()
+    for family in _FAMILIES:
+        known = aruco.getPredefinedDictionary(getattr(aruco, f"DICT_{family}"))
+        ids = aruco.ArucoDetector(known).detectMarkers(grey)[1]
+        counts[family] = 0 if ids is None else len(set(np.ravel(ids).tolist()))
+    most = max(counts, key=lambda each: counts[each])
+    return most if counts[most] >= _MARKERS else ""
 
 
 def charuco_board(board: Board) -> Any:

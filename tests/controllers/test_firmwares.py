@@ -34,6 +34,7 @@ BELTS = "[MSG]\nCLBM:[{bl:1851.5, br:1843.25,   tr:1.8e3,   tl:1820},]\n"
         (SIZE + "G31 Z1\nM851 Z-1\n", "reprap"),
         (MASLOW, "maslow"),
         ("$/Maslow_tlX=-6.2\n", "maslow"),
+        ("Maslow_vertical: false\nMaslow_tlX: -6.2\nMaslow_tlY: 2188.0\n", "maslow"),
         (BELTS, "maslow"),
     ],
 )

@@ -110,7 +110,7 @@ def test_joints_that_are_called_as_links_are_renamed(tmp_path: Path) -> None:
 
 def test_a_parallel_machine_is_no_tree(refused: Any, run: Any, tmp_path: Path) -> None:
     out = tmp_path / "x.sdf"
-    assert "--as sdf is for serial arms" in refused(
+    assert "the target sdf is for serial arms" in refused(
         "export", "hexapod", "--as", "sdf", "--out", out
     )
     with pytest.raises(pk.ArgumentError, match="an SDF model is a tree and holds no loops"):

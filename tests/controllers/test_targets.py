@@ -158,11 +158,100 @@ def test_a_name_of_pkmcal_cannot_be_taken() -> None:
         ({"name": "two words"}, "name must be one word"),
         ({"write": 3}, "write must be a function"),
         ({"takes": "arms"}, "takes"),
+        ({"about": None}, "about of the target own must be a str"),
+        ({"file": 3}, "file of the target own must be a str"),
     ],
 )
 def test_a_wrong_target_is_refused(wrong: dict[str, Any], message: str) -> None:
     with pytest.raises(pk.Error, match=message):
         Target(**({"name": "own", "write": _names, "about": "names"} | wrong))
+
+
+def _half(robot: Any, path: Path) -> None:
+    path.write_text("half of it")
+    raise KeyError("the other half")
+
+
+def _nothing(robot: Any, path: Path) -> None:
+    """Write nothing."""
+
+
+@pytest.mark.parametrize(
+    ("write", "message"), [(_half, "KeyError: 'the other half'"), (_nothing, "wrote no old.txt")]
+)
+def test_a_target_that_does_not_write_the_whole_leaves_what_was_there(
+    write: Any, message: str, tmp_path: Path
+) -> None:
+    old = tmp_path / "old.txt"
+    old.write_text("a machine that works")
+    with pytest.raises(pk.Error, match=f"^the target own .*{message}"):
+        Target("own", write, "mine").export(pk.load("hexapod"), old)
+    assert old.read_text() == "a machine that works" and list(tmp_path.iterdir()) == [old]
+
+
+def test_a_target_writes_a_file_or_a_folder_as_it_states(tmp_path: Path) -> None:
+    robot, old = pk.load("hexapod"), tmp_path / "old.txt"
+    with pytest.raises(pk.Error, match="wrote a file new, and states folder=True"):
+        Target("own", _names, "mine", folder=True).export(robot, tmp_path / "new")
+    with pytest.raises(pk.Error, match="wrote a folder new, and states folder=False"):
+        Target("own", lambda robot, path: path.mkdir(), "mine").export(robot, tmp_path / "new")
+    old.write_text("a machine that works")
+    both = Target("own", lambda robot, path: path.mkdir(), "mine", folder=True)
+    with pytest.raises(pk.Error, match=r"old.txt: the target own writes a folder, this is a file"):
+        both.export(robot, old)
+    assert list(tmp_path.iterdir()) == [old]
+    both.export(robot, tmp_path / "new")
+    assert (tmp_path / "new").is_dir()
+
+
+@pytest.mark.parametrize("path", [None, 3])
+def test_a_path_that_is_none_is_named(path: Any) -> None:
+    with pytest.raises(TypeError, match="path must be a str or path, found"):
+        Target("own", _names, "mine").export(pk.load("hexapod"), path)
+
+
+def _refusing(robot: Any, path: Path) -> None:
+    raise ValueError("no more than five legs")
+
+
+def _failing(robot: Any, path: Path) -> None:
+    path.write_text(robot.legs)
+
+
+@pytest.mark.parametrize(
+    ("write", "message"),
+    [
+        (_refusing, "the target own: no more than five legs"),
+        (_failing, "the target own failed with AttributeError: 'Robot' object has no attribute"),
+        ("no_such_module:write", "the target own: its function 'no_such_module:write' cannot be"),
+        ("pkmcal:no_such", "the target own: its function 'pkmcal:no_such' cannot be had"),
+    ],
+)
+def test_a_target_that_fails_is_named_and_is_no_mistake_in_pkmcal(
+    write: Any, message: str, tmp_path: Path
+) -> None:
+    pk.export.register(Target("own", write, "mine"))
+    done = run("export", "hexapod", "--as", "own", "--out", tmp_path / "a.txt")
+    assert done.exit_code == 2 and done.stderr.startswith(f"pkmcal: {message}")
+    assert not (tmp_path / "a.txt").exists()
+
+
+@pytest.mark.parametrize(
+    ("takes", "machine", "message"),
+    [
+        ("parallel", "3r", "is for parallel machines, found a serial arm"),
+        ("arm", "hexapod", "is for serial arms, found a parallel machine"),
+    ],
+)
+def test_a_machine_that_a_target_does_not_take_is_refused(
+    takes: Any, machine: str, message: str, tmp_path: Path
+) -> None:
+    own = Target("own", lambda machine, path: path.write_text("x"), "mine", takes=takes)
+    with pytest.raises(pk.ArgumentError, match=f"^the target own {message}"):
+        own.export(pk.load(machine), tmp_path / "a.txt")
+    assert not (tmp_path / "a.txt").exists()
+    Target("own", own.write, "mine", takes="any").export(pk.load(machine), tmp_path / "a.txt")
+    assert (tmp_path / "a.txt").read_text() == "x"
 
 
 def installed(folder: Path, value: str) -> None:

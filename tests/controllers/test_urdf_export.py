@@ -60,7 +60,7 @@ def test_what_is_written_is_read_back_as_the_same_arm(tmp_path: Path) -> None:
 def test_a_parallel_machine_is_no_tree(refused: Any, run: Any, tmp_path: Path) -> None:
     out = tmp_path / "x.urdf"
     message = refused("export", "hexapod", "--as", "urdf", "--out", out)
-    assert "--as urdf is for serial arms" in message and not out.exists()
+    assert "the target urdf is for serial arms" in message and not out.exists()
     with pytest.raises(pk.ArgumentError, match="a URDF is a tree and holds no loops"):
         pk.export.urdf(pk.load("hexapod"), out)
     assert run("export", "3r", "--as", "urdf", "--out", out).exit_code == 0

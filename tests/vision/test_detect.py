@@ -21,6 +21,8 @@ cv2 = pytest.importorskip("cv2", reason="OpenCV is not installed (the extra visi
 
 from pkmcal.examples.camera.render import Photographer  # noqa: E402
 
+from ..sweeps import sweep  # noqa: E402
+
 LENS = {
     "fx": 1150.0, "fy": 1152.0, "cx": 402.3, "cy": 296.1, "k1": -0.12, "k2": 0.09, "p1": 5e-4,
     "p2": -3e-4, "k3": 0.0, "width": 800, "height": 600,
@@ -86,7 +88,7 @@ def charuco(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, np.ndarray]
     return taken(tmp_path_factory.mktemp("charuco") / "pictures", board, motions), motions
 
 
-@pytest.mark.parametrize("word", BOARDS)
+@sweep("word", BOARDS, quick=[word for word in BOARDS if word != CHARUCO])
 def test_corners_are_where_opencv_projects_them(tmp_path: Path, word: str) -> None:
     """Without bias: (0, 0) is the centre of a pixel; every corner has its own number."""
     board = Board.parse(word)
@@ -111,7 +113,7 @@ pk.detect(sys.argv[2], pk.readings.Board.parse(sys.argv[3])).write(sys.argv[4])
 """
 
 
-@pytest.mark.parametrize("library", ["pupil_apriltags", "opencv"])
+@sweep("library", ["pupil_apriltags", "opencv"], quick=["pupil_apriltags"])
 def test_either_finder_of_tags_puts_them_in_the_same_place(tmp_path: Path, library: str) -> None:
     """In a process of its own: a fault of the library must not end all other tests."""
     if library != "opencv" and PathFinder.find_spec("pupil_apriltags") is None:
@@ -167,11 +169,12 @@ def test_bad_pictures_are_named_with_the_reason(
     cv2.imwrite(str(folder / "other.png"), other)
     (folder / "twice.png").write_bytes((folder / "2.png").read_bytes())
     found = pk.detect(folder, board)
-    assert [p.path.name for p in found.taken] == [f"{k}.png" for k in range(6)]
+    assert [p.path.name for p in found.taken] == [f"{k}.png" for k in (0, 1, 3, 4, 5)]
     words = {
         "grey.png": "no board found", "few.png": "corners, 6 are needed", "moved.png": "moved",
         "small.png": "640 x 480, the others 800 x 600", "blurred.png": "blurred",
-        "twice.png": "the same picture as 2.png", "other.png": "no board found",
+        "twice.png": "the same picture as 2.png", "2.png": "the same picture as twice.png",
+        "other.png": "no board found",
     }  # fmt: skip
     assert {*found.bad} == {*words}
     for name, word in words.items():
@@ -188,6 +191,27 @@ def test_mirrored_pictures_are_said_to_be_mirrored(
         cv2.imwrite(str(folder / f"{k}.png"), image[:, ::-1])
     found = pk.detect(folder, Board.parse(CHARUCO))
     assert not found.taken and "mirrored" in str(found)
+
+
+def test_a_board_whose_rows_are_stated_before_its_columns_is_said(
+    charuco: tuple[Path, np.ndarray],
+) -> None:
+    kind, _, rest = CHARUCO.partition(":")
+    shape, *others = rest.split(",")
+    exchanged = f"{kind}:{'x'.join(shape.split('x')[::-1])},{','.join(others)}"
+    found = pk.detect(charuco[0] / "0.png", Board.parse(exchanged))
+    assert not found.taken and f"a board of {shape} is found" in str(found)
+
+
+@pytest.mark.slow
+def test_a_board_of_other_markers_or_another_shape_is_said(
+    charuco: tuple[Path, np.ndarray],
+) -> None:
+    strange = pk.detect(charuco[0] / "0.png", Board.charuco(6, 8, 20, 15, "4X4_50"))
+    assert not strange.taken and "is found" not in str(strange)
+    assert "markers of 5X5_1000 are found" in str(strange) and "dictionary that" in str(strange)
+    wide = pk.detect(charuco[0] / "0.png", Board.charuco(9, 6, 20, 15, "5X5_100"))
+    assert not wide.taken and "state the shape" in str(wide)
 
 
 def test_boards_that_are_all_tilted_alike_are_said(tmp_path: Path) -> None:
@@ -261,7 +285,7 @@ PRINTED = (
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("word", PRINTED)
+@sweep("word", PRINTED, quick=PRINTED[:2])
 def test_a_board_is_printed_in_its_true_size(
     run: Callable[..., Any], tmp_path: Path, word: str
 ) -> None:
