@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+
 from pkmcal.display import visible
 
 
@@ -40,6 +44,45 @@ class MissingFileError(FileNotFoundError, FileError):
 
 class CalibrationWarning(_Shown, UserWarning):
     """A warning of `identify` about a fit that succeeded."""
+
+
+def of_the_package(given: object) -> bool:
+    """Return whether a function, or the class of an object, is one of the package."""
+    module = getattr(given.func if isinstance(given, partial) else given, "__module__", None)
+    return str(module).partition(".")[0] == __name__.partition(".")[0]
+
+
+@contextmanager
+def named_failures(
+    owner: object, what: str, needed: str = "", *, files: bool = False
+) -> Iterator[None]:
+    """Name what fails in a class or a function that is no part of the package.
+
+    Parameters
+    ----------
+    owner : object
+        The object of the class, or the function.
+    what : str
+        What it is to the user, the beginning of a sentence: its method, its class.
+    needed : str
+        What it is given and has to return, the end of that sentence.
+    files : bool
+        Whether it is there to write a file that its caller names: errors of the system are his.
+
+    Raises
+    ------
+    TypeError
+        Whatever was raised, but for errors of the package and of memory.
+    """
+    try:
+        yield
+    except Exception as error:
+        passing = (Error, MemoryError, OSError) if files else (Error, MemoryError)
+        if isinstance(error, passing) or of_the_package(owner):
+            raise
+        raise ArgumentTypeError(
+            f"{what} failed with {type(error).__name__}: {error}{needed and '; '}{needed}"
+        ) from error
 
 
 def words_of(error: BaseException) -> str:

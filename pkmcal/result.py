@@ -6,7 +6,7 @@ from abc import abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 from importlib import import_module
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,20 +14,38 @@ from numpy.typing import NDArray
 from pkmcal.display import Table, first_rows, visible
 from pkmcal.exceptions import ArgumentError
 
+Kept = TypeVar("Kept")
+
+
+def read_only(value: Kept) -> Kept:
+    """Return an array, or a tuple with arrays in it, that cannot be written to.
+
+    The array that was given stays as it is. Anything else is returned as it is.
+    """
+    if isinstance(value, np.ndarray) and value.flags.writeable:
+        kept = value.view()
+        kept.flags.writeable = False
+        return cast(Kept, kept)
+    parts: object = value
+    if type(parts) is tuple and any(isinstance(each, np.ndarray) for each in parts):
+        return cast(Kept, tuple(map(read_only, parts)))
+    return value
+
 
 class ReadOnly:
     """Fields that are arrays cannot be written to: what is stated of them would not follow.
 
-    The array that was given stays as it is.
+    Nor can those of its copies, and of what is read from a pickle.
     """
 
     def __post_init__(self) -> None:
         fields = vars(self)
         for name, value in fields.items():
-            if isinstance(value, np.ndarray) and value.flags.writeable:
-                kept = value.view()
-                kept.flags.writeable = False
-                fields[name] = kept
+            fields[name] = read_only(value)
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self.__post_init__()
 
 
 class Result(ReadOnly):

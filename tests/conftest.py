@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import signal
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -17,6 +18,14 @@ from pkmcal.cli.verbs import app
 
 # Folders of the sources beside the package, such as wheels; last, for pkmcal is the installed one.
 sys.path.append(str(Path(__file__).resolve().parents[1]))
+
+# A shell that starts the tests in the background, or nohup, has them ignore these; tests send them.
+for _number, _handler in (
+    (signal.SIGINT, signal.default_int_handler),
+    (getattr(signal, "SIGHUP", None), signal.SIG_DFL),  # Windows has it not
+):
+    if _number is not None and signal.getsignal(_number) is signal.SIG_IGN:
+        signal.signal(_number, _handler)
 
 # No test is of wall time: other work may take all cores.
 settings.register_profile("pkmcal", deadline=None, suppress_health_check=[HealthCheck.too_slow])

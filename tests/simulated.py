@@ -9,6 +9,9 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray
 from pkmcal.calibration.identification import Identification
+from pkmcal.diagnostics.check import Said
+from pkmcal.diagnostics.checks import CHECKS
+from pkmcal.diagnostics.diagnosis import statements
 from pkmcal.kinematics.robot import Robot
 
 
@@ -56,3 +59,10 @@ def missed(robot: Robot, true: Robot, actuators: FloatArray) -> FloatArray:
 def altered(found: Identification, **changes: Any) -> Identification:
     """The result with other numbers under the flat names that users read."""
     return replace(found, **changes)
+
+
+def said_by(found: Identification, *names: str) -> dict[str, Said]:
+    """What these checks say, beside each other alone: no others are made."""
+    checks = [check for check in CHECKS if check.name in names]
+    assert len(checks) == len(names)
+    return {each.check: each for each in statements(found, checks, {})}

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import copy
+import dataclasses
 from collections.abc import Callable
+from pickle import dumps, loads
 
 import numpy as np
 import pytest
@@ -43,6 +46,30 @@ def test_no_array_of_a_result_can_be_written_to(results: dict[str, object]) -> N
     for key in ("values", "stderr", "covariance", "covar", "interval95", "correlation_matrix"):
         with pytest.raises(ValueError, match="read-only"):
             getattr(found, key)[...] = 0.0
+
+
+@pytest.mark.parametrize("again", [lambda it: it, copy.deepcopy, lambda it: loads(dumps(it))])
+def test_what_a_calibration_states_cannot_be_written_to_nor_can_its_copies(
+    results: dict[str, object], again: Callable[[object], object]
+) -> None:
+    found = again(results["identification"])
+    assert isinstance(found, pk.Identification)
+    end = found.fit.end
+    arrays = [found.values, found.stderr, found.rows, found.read, *found.residuals, end.theta]
+    arrays += [end.pose, end.actuators, end.status, *end.residuals, found.fit.covariance]
+    estimate, tested = found.fit.estimate, found.fit.uncertainty.tested
+    for each in (found.fit.parameters, estimate, estimate.state, estimate.state.fitted, tested):
+        fields = [getattr(each, field.name) for field in dataclasses.fields(each)]
+        own = [value for value in fields if isinstance(value, np.ndarray)]
+        assert own, type(each)
+        arrays += own
+    for array in arrays:
+        with pytest.raises(ValueError, match="read-only"):
+            array[...] = 0
+    said = str(found)
+    found.observability["O1"] = 99.0
+    found.parameters["offset1"]["value"] = 99.0
+    assert str(found) == said and found.observability["O1"] != 99.0
 
 
 def test_arrays_of_the_caller_stay_his(hexapod: pk.Robot) -> None:

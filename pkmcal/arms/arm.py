@@ -70,6 +70,10 @@ class SerialArm(SerialChain, Result):
     laws : JointLaws, optional
         What its joints add to their commands: sag, gears, coupled axes. Files and
         `identify(effects=…)` give them.
+    follows : mapping of int to mapping of int to float, optional
+        Joints without an actuator: ``{3: {2: 1.0}}`` is joint 3 that moves as far as joint 2, both
+        counted from 1, in mm and rad; at zero it is where joint 2 is at zero. Calls then take the
+        coordinates of the other joints alone.
     uncertainty : mapping of str to float, optional
         How wrong numbers may be that a calibration does not look for, as `identify` takes it.
 
@@ -140,7 +144,7 @@ class SerialArm(SerialChain, Result):
     ) -> SerialArm:
         """An arm from a URDF file: the chain of moving joints between two links.
 
-        Metres become mm.
+        Metres become mm. Joints that follow others (mimic) have no coordinate of their own.
 
         Parameters
         ----------
@@ -156,7 +160,8 @@ class SerialArm(SerialChain, Result):
         ValueError
             No URDF file: cut short, with a document type or xacro, a joint without its links, an
             origin that is not three numbers. No such links, no moving joint between them, or one
-            that an arm has not (floating, planar, mimic).
+            that an arm has not (floating, planar). A joint that follows (mimic) one that is not
+            between them.
         """
         from pkmcal.arms import urdf  # brings a parser of XML
 
@@ -211,6 +216,7 @@ class SerialArm(SerialChain, Result):
             name=self.name,
             joint_names=self.joint_names,
             laws=self.laws,
+            follows=self.followers.table(),
             uncertainty=self.uncertainty.table(),
         )
 
@@ -241,11 +247,13 @@ class SerialArm(SerialChain, Result):
             1 where a joint's reading had grown, -1 where it had fallen, 0 where that is not known:
             for all rows, or for each of those that are then computed.
         """
-        rows, shape = as_rows("approach", approach, self.n_joints)
+        rows, shape = as_rows("approach", approach, self.n_actuators)
         if not np.isin(rows, (-1, 0, 1)).all():
             raise ArgumentError("approach must be 1, -1 or 0 for each joint")
         if self.laws is None:
             return self
+        if self.followers:
+            rows = np.sign(self.followers.joints_at(rows))
         return self.with_laws(self.laws.approaching(rows[0] if shape == () else rows))
 
     def under(self, load: Load | None) -> SerialArm:
@@ -460,17 +468,18 @@ class SerialArm(SerialChain, Result):
     def limits(self) -> FloatArray:
         """Least and largest coordinate of each joint (n, 2), mm and rad, of its URDF file.
 
-        Infinite where it states none, or where the arm is not from such a file.
+        Infinite where it states none, or where the arm is not from such a file. Joints that follow
+        others have no row, and bound what they follow.
         """
         if self.source is None:
-            return np.tile([-np.inf, np.inf], (self.n_joints, 1))
+            return np.tile([-np.inf, np.inf], (self.n_actuators, 1))
         from pkmcal.arms import urdf
 
-        return urdf.limits(*self.source)
+        return self.followers.limits(urdf.limits(*self.source))
 
     def _is_alike(self, other: SerialArm) -> bool:
         """Return whether another arm equals this one up to rounding, joint errors apart."""
-        if self.kinds != other.kinds:
+        if self.kinds != other.kinds or self.followers.table() != other.followers.table():
             return False
         pairs = ((self.screws, other.screws), (self.points, other.points), (self.home, other.home))
         return all(np.allclose(one, two, rtol=0, atol=_SAME) for one, two in pairs)

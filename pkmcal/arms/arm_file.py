@@ -11,9 +11,11 @@ import numpy as np
 from pkmcal import arguments, screw
 from pkmcal.arms import joint_law_file
 from pkmcal.arms.arm_geometry import arm_geometry
+from pkmcal.arms.followers import Followers, Follows
 from pkmcal.arms.inputs import KINDS, ArmArguments, kinds_of
 from pkmcal.arrays import FloatArray, Unit
 from pkmcal.core.library import COORDINATE_UNITS, POSE
+from pkmcal.exceptions import ArgumentError
 from pkmcal.files.atomic import write_whole
 from pkmcal.files.toml_lines import Source
 from pkmcal.files.toml_table import Table, shown
@@ -23,6 +25,7 @@ from pkmcal.geometry.robot_file_writer import lines
 from pkmcal.geometry.stated_uncertainty import read_uncertainty
 
 TOP = ("name", "units", "gravity", "tool", "uncertainty", "joint")
+_UNITS: dict[str, Unit] = {"revolute": "rad", "prismatic": "mm"}
 HEADER = "# A serial arm for pkmcal, at zero: lengths in mm, angles in rad.\n"
 
 
@@ -47,13 +50,14 @@ def parse(source: Source) -> ArmArguments:
     tool.only(("home",))
     joints = top.tables("joint", "an arm")
     for joint in joints:
-        joint.only(("name", "kind", "axis", "point", "error", *joint_law_file.KEYS))
+        joint.only(("name", "kind", "axis", "point", "error", "follows", *joint_law_file.KEYS))
     kinds = kinds_of(
         [joint.choice("kind", KINDS, "kind of joint") for joint in joints], len(joints)
     )
     axes = np.array([joint.vector("axis") for joint in joints])
     points = np.array([_point(joint) for joint in joints])
     errors = np.array([_error(joint) for joint in joints])
+    follows = _follows(joints, kinds)
     laws = joint_law_file.read(top, joints, axes, points, kinds)
     stated = top.table("uncertainty") if "uncertainty" in top else Table({}, source)
     return {
@@ -66,6 +70,7 @@ def parse(source: Source) -> ArmArguments:
         "joint_names": _names(joints),
         "source": None,
         "laws": laws,
+        "follows": follows,
         "uncertainty": read_uncertainty(stated, arm_geometry(errors, laws)).table(),
     }
 
@@ -79,7 +84,7 @@ def write(arm: ArmArguments, path: str | os.PathLike[str], comment: str = "") ->
         The folder does not exist or cannot be written.
     """
     head: dict[str, Any] = {"name": arm["name"], "units": {"length": "mm", "angle": "rad"}}
-    laws = arm["laws"]
+    laws, follows = arm["laws"], arm["follows"] or {}
     if laws is not None:
         head["gravity"] = list(laws.pulls.gravity)
     blocks = [HEADER, lines(head), "[tool]\n" + lines({"home": arm["home"][:3].tolist()})]
@@ -91,6 +96,8 @@ def write(arm: ArmArguments, path: str | os.PathLike[str], comment: str = "") ->
             joint["name"] = arm["joint_names"][i]
         joint |= {"kind": kind, "axis": arm["axes"][i].tolist()}
         joint["point"] = arm["points"][i].tolist()
+        if leaders := follows.get(i + 1):
+            joint["follows"] = [{"joint": k, "by": by} for k, by in leaders.items()]
         error = dict(zip(ERRORS, arm["joint_errors"][i].tolist(), strict=True))
         if any(error.values()):
             joint["error"] = error
@@ -116,6 +123,29 @@ def _names(joints: Sequence[Table]) -> tuple[str, ...] | None:
 def _point(joint: Table) -> list[float]:
     found = joint.list_of("point", 3, "three coordinates")
     return [joint.as_number("point", each, "mm") for each in found]
+
+
+def _follows(joints: Sequence[Table], kinds: Sequence[str]) -> Follows | None:
+    """The joints that each joint without an actuator follows, in mm and rad; None of none."""
+    found: dict[int, dict[int, float]] = {}
+    for i, joint in enumerate(joints):
+        for leader in joint.tables("follows", "the key") if "follows" in joint else []:
+            leader.only(("joint", "by"), "a joint that another one follows")
+            number = leader.integer("joint")
+            if not 1 <= number <= len(joints):
+                leader.fail("joint", f"must be another one, 1 to {len(joints)}")
+            own, its = (_UNITS[kinds[k]] for k in (i, number - 1))
+            by = leader.as_number("by", leader["by"], own) / leader.units.factor(its)
+            leaders = found.setdefault(i + 1, {})
+            if number in leaders:
+                leader.fail("joint", f"joint {number} is stated twice")
+            leaders[number] = by
+        if i + 1 in found:
+            try:
+                Followers(found, len(joints))
+            except ArgumentError as error:
+                joint.fail("follows", str(error).partition(": ")[2])
+    return found or None
 
 
 def _error(joint: Table) -> list[float]:

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from pkmcal import screw
 from pkmcal.arguments import shown, word, words
+from pkmcal.arms.followers import Follows
 from pkmcal.arms.joint_laws import JointLaws
 from pkmcal.arrays import FloatArray, as_numbers, as_rows, furthest_axis
 from pkmcal.core.screws import FRAMES
@@ -42,6 +43,7 @@ class ArmArguments(TypedDict):
     joint_names: tuple[str, ...] | None
     source: Source | None
     laws: JointLaws | None
+    follows: Follows | None
     uncertainty: Uncertain
 
 

@@ -34,6 +34,10 @@ class Solvable(Protocol):
         """Number of joints, n."""
 
     @property
+    def n_actuators(self) -> int:
+        """Number of joints that have an actuator, m."""
+
+    @property
     def length(self) -> float:
         """Characteristic length, mm."""
 
@@ -124,7 +128,7 @@ def damped_least_squares(
     rows, shape = screw.as_motions("target", target)
     goal = rows.reshape(-1, 4, 4)
     arm.require_loads_of(len(goal))
-    n = arm.n_joints
+    n = arm.n_actuators
     theta = np.zeros((len(goal), n))
     if guess is not None:
         start, guess_shape = as_rows("guess", guess, n)
@@ -135,7 +139,7 @@ def damped_least_squares(
         theta += start
     errors = None
     if joint_errors is not None:
-        errors = checked_errors(joint_errors, n, shape)
+        errors = checked_errors(joint_errors, arm.n_joints, shape)
     search = _Search(arm, goal, errors, PARTS[parts])
     begun = theta.copy()
     status, iterations, residual = search.run(theta)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal.arguments import instance
+from pkmcal.arms.followers import Followers, Follows
 from pkmcal.arms.inputs import (
     ArmArguments,
     Frame,
@@ -55,6 +56,7 @@ class SerialChain:
         joint_names: Sequence[str] | None = None,
         source: Source | None = None,
         laws: JointLaws | None = None,
+        follows: Follows | None = None,
         uncertainty: Uncertain = None,
     ) -> None:
         self._name = instance("name", name, str)
@@ -63,6 +65,7 @@ class SerialChain:
         self._joint_names = names_of(joint_names, len(self._axes))
         self._source = source
         self._laws = laws
+        self._followers = Followers(follows, len(self._axes))
         self._uncertainty = stated_uncertainty(uncertainty)
         self._home = motion("home", home)
         prismatic = np.array([kind == "prismatic" for kind in self._kinds], dtype=np.int32)
@@ -105,6 +108,22 @@ class SerialChain:
         return len(self.kinds)
 
     @property
+    def n_actuators(self) -> int:
+        """Number of joints that have an actuator, m: all but those that follow others."""
+        return int(self._followers.driven.size)
+
+    @property
+    def followers(self) -> Followers:
+        """The joints that follow others; it is false where there are none."""
+        return self._followers
+
+    @property
+    def actuator_names(self) -> tuple[str, ...] | None:
+        """Names of the joints that have an actuator, as in logs of controllers."""
+        names = self._joint_names
+        return None if names is None else tuple(names[i] for i in self._followers.driven)
+
+    @property
     def axes(self) -> FloatArray:
         """Unit directions of the joints' axes at zero, (n, 3)."""
         axes: FloatArray = self._axes.copy()
@@ -130,23 +149,30 @@ class SerialChain:
 
     @property
     def actuator_units(self) -> tuple[Unit, ...]:
-        """Unit of each joint coordinate, "rad" or "mm"."""
-        return tuple("rad" if kind == "revolute" else "mm" for kind in self.kinds)
+        """Unit of each joint coordinate that is commanded, "rad" or "mm"."""
+        kinds = [self.kinds[i] for i in self._followers.driven]
+        return tuple("rad" if kind == "revolute" else "mm" for kind in kinds)
 
     @property
     def length(self) -> float:
         """Characteristic length, mm: at this radius a rotation counts as its arc.
 
-        The root mean square distance of the joints' points from the tool at zero.
+        The root mean square distance of the joints' points from the tool at zero; 1 where that is
+        0.
         """
-        reach = self._points - self._home[:3, 3]
-        return float(np.hypot.reduce(reach, axis=None) / np.sqrt(self.n_joints)) or 1.0
+        return self._distance or 1.0
+
+    @property
+    def without_lengths(self) -> bool:
+        """True if all joints' points are the tool's at zero: no length says how large it is."""
+        return self._distance == 0.0
 
     @property
     def screws(self) -> FloatArray:
         """Nominal unit screws (ω, v) at zero, (n, 6): (ω, r × ω), or (0, v) (eq. 1)."""
-        none = np.zeros((self.n_joints, 6))
-        screws: FloatArray = self.jacobian(np.zeros(self.n_joints), none).T.copy()
+        none = self.core.links(np.zeros((self.n_joints, 6)))
+        at_zero = self.core.jacobian(np.zeros((1, self.n_joints)), none, frame_number("space"))
+        screws: FloatArray = at_zero[0].T.copy()
         return screws
 
     @property
@@ -162,6 +188,7 @@ class SerialChain:
             "joint_names": self.joint_names,
             "source": self.source,
             "laws": self.laws,
+            "follows": self._followers.table() or None,
             "uncertainty": self.uncertainty.table(),
         }
 
@@ -178,7 +205,8 @@ class SerialChain:
         Parameters
         ----------
         theta : array_like (..., n)
-            Joint coordinates, rad and mm.
+            Joint coordinates, rad and mm; of an arm with joints that follow others those of the
+            other ones, (..., m).
         joint_errors : array_like (n, 6) or (..., n, 6), optional
             Δx Δy Δz [mm], Δφ Δθ Δψ [rad] of each joint, for all rows or of each row; in place of
             the arm's own.
@@ -229,7 +257,43 @@ class SerialChain:
         by_joints = self.core.jacobian(self._moved(rows), links, seen)
         if self._laws is not None:
             by_joints = by_joints @ self._laws.slope(rows)
-        return by_joints.reshape(*shape, 6, self.n_joints)
+        if self._followers:
+            by_joints = by_joints @ self._followers.shares
+        return by_joints.reshape(*shape, 6, self.n_actuators)
+
+    def joint_jacobian(
+        self, theta: ArrayLike, joint_errors: ArrayLike | None = None, frame: Frame = "space"
+    ) -> FloatArray:
+        """The tool's twist by each joint's own motion, also of joints that follow others.
+
+        Parameters
+        ----------
+        theta : array_like (..., m)
+            Joint coordinates as in `forward`.
+        joint_errors : array_like (n, 6) or (..., n, 6), optional
+            As in `forward`.
+        frame : {"space", "body", "tip"}
+            As in `jacobian`.
+
+        Returns
+        -------
+        ndarray (..., 6, n)
+            ω first, rad and mm per rad or mm.
+        """
+        seen = frame_number(frame)
+        rows, shape, links = self._given(theta, joint_errors)
+        return self.core.jacobian(self._moved(rows), links, seen).reshape(*shape, 6, self.n_joints)
+
+    def joint_coordinates(self, theta: ArrayLike) -> FloatArray:
+        """Return where all joints are commanded to, (..., n), also those that follow others.
+
+        Parameters
+        ----------
+        theta : array_like (..., m)
+            Coordinates of the joints that have an actuator, rad and mm.
+        """
+        rows, shape = as_rows("theta", theta, self.n_actuators)
+        return self._followers.joints_at(rows).reshape(*shape, self.n_joints)
 
     def error_jacobian(
         self, theta: ArrayLike, joint_errors: ArrayLike | None = None, frame: Frame = "space"
@@ -333,6 +397,12 @@ class SerialChain:
 
     # --------------------------------------------------------------------------------------------
 
+    @property
+    def _distance(self) -> float:
+        """Root mean square distance of the joints' points from the tool at zero, mm."""
+        reach = self._points - self._home[:3, 3]
+        return float(np.hypot.reduce(reach, axis=None) / np.sqrt(self.n_joints))
+
     def _linked(self, joint_errors: ArrayLike | None) -> tuple[FloatArray, Links]:
         """Return joint errors as they are kept, and the links that they make."""
         errors = np.zeros((self.n_joints, 6))
@@ -350,13 +420,14 @@ class SerialChain:
         return found
 
     def _moved(self, rows: FloatArray) -> FloatArray:
-        """Return the true joint coordinates at these commands."""
+        """Return the true coordinates of all joints at these commands of theirs."""
         return rows if self._laws is None else self._laws.moved(rows)
 
     def _given(
         self, theta: ArrayLike, joint_errors: ArrayLike | None
     ) -> tuple[FloatArray, tuple[int, ...], Links]:
-        rows, shape = as_rows("theta", theta, self.n_joints)
+        rows, shape = as_rows("theta", theta, self.n_actuators)
+        rows = self._followers.joints_at(rows)
         self.require_loads_of(len(rows))
         if joint_errors is None:
             return rows, shape, self._links

@@ -26,19 +26,31 @@ _KINDS: dict[str, JointKind] = {
 
 @dataclass(frozen=True)
 class Joint:
-    """A moving joint of a chain: its name, its kind, and at zero its parent link and itself."""
+    """A moving joint of a chain, where all commands are zero.
+
+    A joint that follows another then stands at its offset, by which its child link is turned or
+    shifted against its own frame.
+    """
 
     name: str
     kind: JointKind
     parent: FloatArray  # (4, 4) of the parent link in the base, mm
     origin: FloatArray  # (4, 4) of the joint in the base, mm
     axis: FloatArray  # (3,) in the joint's frame
-    limits: tuple[float, float]  # mm or rad; infinite where there are none
+    child: FloatArray  # (4, 4) of the child link in the base, mm
+    limits: tuple[float, float]  # mm or rad, without the offset; infinite where there are none
+    leader: tuple[str, float] | None  # mm or rad by mm or rad of a joint that it follows
 
 
 def read(path: str | os.PathLike[str], tip: str | None, base: str | None) -> ArmArguments:
     """Read the chain of moving joints from base to tip; see `SerialArm.from_urdf`."""
     name, joints, home = _chain(path, tip, base)
+    number = {joint.name: i for i, joint in enumerate(joints, 1)}
+    follows = {
+        number[joint.name]: {number[joint.leader[0]]: joint.leader[1]}
+        for joint in joints
+        if joint.leader is not None
+    }
     return {
         "axes": np.array([joint.origin[:3, :3] @ joint.axis for joint in joints]),
         "points": np.array([joint.origin[:3, 3] for joint in joints]),
@@ -49,12 +61,16 @@ def read(path: str | os.PathLike[str], tip: str | None, base: str | None) -> Arm
         "joint_names": tuple(joint.name for joint in joints),
         "source": Source(str(path), tip, base),
         "laws": None,
+        "follows": follows or None,
         "uncertainty": None,
     }
 
 
 def limits(path: str | os.PathLike[str], tip: str | None, base: str | None) -> FloatArray:
-    """Least and largest coordinate of each joint (n, 2), mm and rad; infinite where not stated."""
+    """Least and largest coordinate of each joint (n, 2), mm and rad; infinite where not stated.
+
+    Of a joint that follows another less its offset, as an arm counts it.
+    """
     return np.array([joint.limits for joint in _chain(path, tip, base)[1]])
 
 
@@ -107,7 +123,7 @@ def weights(
             continue
         k = number[above[owner].name]
         masses[k] += inertial.mass
-        moments[k] += inertial.mass * (joints[k].origin @ place)[:3]
+        moments[k] += inertial.mass * (joints[k].child @ place)[:3]
     carried = masses > 0.0
     moments[carried] /= masses[carried, None]
     return masses, moments
@@ -139,30 +155,77 @@ def _chain(
     if base is not None and link != base:
         raise FileError(f"base: {base!r} is not above {tip!r} in {path}")
     joints, place = [], np.eye(4)
+    following = _following(path, chain, robot)
     for joint in chain:
         parent = place
-        place = parent @ joint.origin
+        place = origin = parent @ joint.origin
         if not np.isfinite(place).all():
             raise FileError(f"{path}: joint {joint.name!r}: origin must be finite")
         if joint.type == "fixed":
             continue
-        if joint.follows:
-            raise FileError(
-                f"{path}: joint {joint.name!r} follows {joint.follows} (mimic), and each joint of a"
-                " serial arm has an actuator: without its <mimic> it is one, whose column of the"
-                " measurements states where it then is"
-            )
         if joint.type not in _KINDS:
             raise FileError(
                 f"{path}: joint {joint.name!r} is {joint.type}, which a serial arm has not"
             )
         if not any(joint.axis):
             raise FileError(f"{path}: joint {joint.name!r}: axis must be a direction, found 0 0 0")
-        axis = np.array(joint.axis)
-        joints.append(Joint(joint.name, _KINDS[joint.type], parent, place, axis, joint.limits))
+        axis, kind = np.array(joint.axis), _KINDS[joint.type]
+        leader, offset = following.get(joint.name, (None, 0.0))
+        if offset:
+            place = origin @ _motion(kind, axis, offset)
+        low, high = joint.limits
+        ends = (low - offset, high - offset)
+        joints.append(Joint(joint.name, kind, parent, origin, axis, place, ends, leader))
     if not joints:
         raise FileError(f"{path}: no moving joint above the link {tip!r}")
     return robot.name, joints, place
+
+
+def _motion(kind: JointKind, axis: FloatArray, by: float) -> FloatArray:
+    """The motion (4, 4) of a joint by mm or rad, in its own frame."""
+    way = axis / np.linalg.norm(axis) * by
+    none = np.zeros(3)
+    turning = kind == "revolute"
+    return screw.exp(np.concatenate([way, none] if turning else [none, way]))
+
+
+def _following(
+    path: str | os.PathLike[str], chain: list[urdf_file.Element], robot: urdf_file.File
+) -> dict[str, tuple[tuple[str, float], float]]:
+    """The joints of a chain that follow: whom and by how much, and their offsets, mm and rad.
+
+    A joint that follows a follower follows whom that one follows.
+    """
+    by_name = {joint.name: joint for joint in robot.joints}
+    moving = {joint.name for joint in chain if joint.type in _KINDS}
+    found = {}
+    for joint in chain:
+        if joint.follows is None or joint.type not in _KINDS:
+            continue
+        place = f"{path}: joint {joint.name!r}"
+        leader, multiplier, offset = joint.follows
+        seen = [joint.name]
+        while leader in by_name and (further := by_name[leader].follows) is not None:
+            if leader in seen:
+                raise FileError(f"{place} follows itself (mimic): {' → '.join([*seen, leader])}")
+            seen.append(leader)
+            offset += multiplier * further.offset
+            leader, multiplier = further.joint, multiplier * further.multiplier
+        if leader not in moving:
+            why = "is not in the file" if leader not in by_name else "does not move the tool here"
+            raise FileError(
+                f"{place} follows {leader!r} (mimic), which {why}: take a tip and a base with"
+                f" {leader!r} between them, or write the joint without its <mimic> and state its"
+                " own column in the measurements"
+            )
+        own, its = _per_unit(joint), _per_unit(by_name[leader])
+        found[joint.name] = (leader, multiplier * own / its), offset * own
+    return found
+
+
+def _per_unit(joint: urdf_file.Element) -> float:
+    """Mm or rad of a unit of a joint's coordinate."""
+    return METRE if _KINDS[joint.type] == "prismatic" else 1.0
 
 
 def _only_end(path: str | os.PathLike[str], robot: urdf_file.File) -> str:

@@ -12,6 +12,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from os import PathLike
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,12 +26,19 @@ _MOST_NESTED = 100
 _XACRO = "{http://www.ros.org/wiki/xacro}"
 
 
+class Mimic(NamedTuple):
+    """A joint that another one follows: it stands at multiplier × that joint + offset, m or rad."""
+
+    joint: str
+    multiplier: float
+    offset: float
+
+
 @dataclass(frozen=True)
 class Element:
     """A joint as the file states it: origin (4, 4) in its parent link, mm; axis in its frame.
 
-    Its limits are in mm or rad, infinite where it states none. `follows` is what it mimics, such as
-    "2 · lift", or "".
+    Its limits are in mm or rad, infinite where it states none. `follows` is what it mimics.
     """
 
     name: str
@@ -39,7 +47,7 @@ class Element:
     child: str
     origin: FloatArray
     axis: tuple[float, float, float]
-    follows: str
+    follows: Mimic | None
     limits: tuple[float, float]
 
 
@@ -170,12 +178,21 @@ def _joint(path: str | PathLike[str], joint: ElementTree.Element) -> Element:
     pose = (*_three(place, origin, "xyz"), *_three(place, origin, "rpy"))
     home = screw.from_pose([*(METRE * number for number in pose[:3]), *pose[3:]])
     axis = _three(place, _only(place, joint, "axis"), "xyz", default=(1.0, 0.0, 0.0))
-    mimic = _only(place, joint, "mimic")
-    follows = ""
-    if mimic is not None:
-        follows = f"{mimic.get('multiplier', '1')} · {_attribute(place, mimic, 'joint')}"
+    follows = _mimic(place, _only(place, joint, "mimic"))
     limits = _limits(place, joint, kind)
     return Element(name, kind, ends[0], ends[1], np.asarray(home), axis, follows, limits)
+
+
+def _mimic(place: str, stated: ElementTree.Element | None) -> Mimic | None:
+    if stated is None:
+        return None
+    try:
+        multiplier, offset = float(stated.get("multiplier", "1")), float(stated.get("offset", "0"))
+    except ValueError:
+        multiplier = offset = math.nan
+    if not (math.isfinite(multiplier) and math.isfinite(offset)):
+        raise FileError(f"{place}: <mimic> multiplier and offset must be finite numbers")
+    return Mimic(_attribute(place, stated, "joint"), multiplier, offset)
 
 
 def _inertials(

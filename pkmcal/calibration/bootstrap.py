@@ -24,12 +24,12 @@ from pkmcal.arrays import FloatArray
 from pkmcal.calibration.identification import Identification
 from pkmcal.display import Table
 from pkmcal.estimation.equations import Equations
+from pkmcal.estimation.estimator import Estimator
 from pkmcal.estimation.evaluation import Evaluation
-from pkmcal.estimation.labels import labels
-from pkmcal.estimation.least_squares import Search
 from pkmcal.estimation.redrawn import redrawn
 from pkmcal.exceptions import ArgumentError
 from pkmcal.fitted.fit import Fit
+from pkmcal.progress import Progress
 from pkmcal.result import Result
 
 _TOGETHER = 20  # replicates that one task computes
@@ -104,6 +104,7 @@ def bootstrap(
     seed: int = 0,
     *,
     executor: Executor | None = None,
+    progress: Progress | None = None,
 ) -> Bootstrap:
     """Repeat a calibration to see how far its parameters scatter.
 
@@ -123,6 +124,8 @@ def bootstrap(
     executor : concurrent.futures.Executor, optional
         Where replicates are computed: threads, processes, or whatever else hands out tasks this
         way. None: here.
+    progress : callable, optional
+        Called now and then as ``progress(done, total)``, replicates. What it raises ends the work.
 
     Returns
     -------
@@ -154,7 +157,8 @@ def bootstrap(
     workers = arguments.executor(executor)
     replicate = Replicate(found.fit)
     done: Iterable[FloatArray] = (workers.map if workers else map)(replicate, parts)
-    values = np.concatenate(list(done))[:, found.columns]
+    told = _told(done, replicates, progress)
+    values = np.concatenate(list(told))[:, found.columns]
     good = values[np.isfinite(values).all(axis=1)]
     if len(good) < 2:
         raise ArgumentError("found: its replicates do not converge, the fit is not to be trusted")
@@ -172,6 +176,18 @@ def bootstrap(
     )
 
 
+def _told(
+    done: Iterable[FloatArray], replicates: int, progress: Progress | None
+) -> Iterator[FloatArray]:
+    """Parts as they are done, told of."""
+    count = 0
+    for each in done:
+        yield each
+        count += len(each)
+        if progress is not None:
+            progress(count, replicates)
+
+
 class Replicate:
     """A calibration with other signs of its residuals; called with seeds, in any process.
 
@@ -183,7 +199,7 @@ class Replicate:
 
     def __init__(self, fit: Fit) -> None:
         self._equations, self._estimate = fit.uncertainty.equations, fit.estimate
-        self._pose = labels(self._equations).pose  # equations of one pose take one sign
+        self._pose = self._equations.blocks.pose  # equations of one pose take one sign
         self._left = self._corrected()
 
     def _corrected(self) -> FloatArray:
@@ -224,12 +240,10 @@ class Replicate:
 
     def _solved(self, equations: Equations, at: Evaluation) -> FloatArray:
         state = self._estimate.state
-        search = Search(equations, at)
+        search = Estimator.of(equations, at, state.loss)
         kept = state.fitted.unidentifiable
         pins = state.fitted.singular[0] * kept.T
-        u, trail = search.best(
-            search.begin(), np.zeros(len(at.theta)), state.noise, state.loss, pins
-        )
-        theta = at.theta + search.scale * (u - kept @ (kept.T @ u))
+        best = search.best(np.zeros(len(at.theta)), state.noise, state.width, pins)
+        theta = at.theta + search.scale * (best.u - kept @ (kept.T @ best.u))
         found = equations.parameters.reported(theta)
-        return found if trail.converged else np.full_like(found, np.nan)
+        return found if best.converged else np.full_like(found, np.nan)

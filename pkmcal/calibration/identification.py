@@ -17,7 +17,7 @@ from pkmcal.calibration import summary
 from pkmcal.core.instruments import points
 from pkmcal.diagnostics.breakeven import Breakeven, breakeven, in_words
 from pkmcal.diagnostics.checks import AT_ONCE, CHECKS
-from pkmcal.diagnostics.diagnosis import Diagnosis
+from pkmcal.diagnostics.diagnosis import findings_of, statements
 from pkmcal.diagnostics.drift import Drift
 from pkmcal.diagnostics.law_tests import LawTest, law_tests
 from pkmcal.diagnostics.measuring_order import MeasuringOrder
@@ -58,7 +58,7 @@ class Identification(Solution[Machine], Result):
     @cached_property
     def warnings(self) -> tuple[str, ...]:
         """Warnings of `identify` about measurements or result."""
-        return tuple(each.text for each in Diagnosis(self, AT_ONCE, self._findings).said())
+        return tuple(each.text for each in statements(self, AT_ONCE, self._findings))
 
     @cached_property
     def verdict(self) -> Verdict:
@@ -69,9 +69,10 @@ class Identification(Solution[Machine], Result):
         """
         return diagnose(self, CHECKS, self._findings)
 
-    def _finding(self, check: str) -> Any:
-        """The finding of a check; None where it has none."""
-        return next(iter(Diagnosis(self, CHECKS, self._findings).findings(check)), None)
+    def _finding(self, name: str) -> Any:
+        """The finding of the check of this name; None where it has none."""
+        check = next(each for each in CHECKS if each.name == name)
+        return next(iter(findings_of(self, check, self._findings)), None)
 
     @property
     def moved(self) -> tuple[Moved, ...]:

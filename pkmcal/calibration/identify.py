@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Literal, TypeVar, cast
 
-from pkmcal.arguments import earlier_keywords, word, words
+from pkmcal.arguments import earlier_keywords, function, word, words
 from pkmcal.arms.arm import SerialArm
 from pkmcal.calibration.asked import (
     EARLIER,
@@ -34,7 +35,7 @@ from pkmcal.diagnostics.row_errors import likely_mistakes
 from pkmcal.diagnostics.sag import sag_that_helps
 from pkmcal.effects.effect import Effects
 from pkmcal.effects.stated import effects_on
-from pkmcal.estimation.datasets import as_fit_data, by_set
+from pkmcal.estimation.datasets import as_fit_data, by_set, roles_of
 from pkmcal.estimation.free_parameters import parameters
 from pkmcal.estimation.held_coefficients import coefficients, of_the_machine, with_held
 from pkmcal.estimation.own_residuals import Residual, checked_residuals
@@ -47,6 +48,7 @@ from pkmcal.geometry.stated_uncertainty import Uncertain, stated_uncertainty
 from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
+from pkmcal.progress import PERCENT, Progress, part, telling, within
 
 Given = TypeVar("Given", bound=Robot | SerialArm)
 
@@ -68,6 +70,7 @@ def identify(
     effects: Effects | Literal["auto"] = (),
     uncertainty: Uncertain = None,
     residuals: Residual | Sequence[Residual] = (),
+    progress: Progress | None = None,
 ) -> Identification[Given]:
     """Find the geometry that agrees best with measurements.
 
@@ -166,6 +169,10 @@ def identify(
         Derivatives are found by differences, unless the function gives a pair: its residuals and
         their derivatives by name, ``(r, {"base1.x": dr})``. Its attribute ``numbers`` may state
         more numbers to be found, by name where each starts, in mm or as ``(value, unit)``.
+    progress : callable, optional
+        Called now and then as ``progress(done, total)``, with what share of the work is done in
+        percent, and 100: by its parts and the steps of searches, of which it is not known before
+        how many there are. What it raises ends the work.
 
     Returns
     -------
@@ -204,60 +211,84 @@ def identify(
                 identify, robot, measurements, free, prior=prior, loss=loss, unknown=unknown,
                 holdout=holdout, bounds=bounds, per_session=per_session,
                 fix=fix, drop=drop, uncertainty=uncertainty, residuals=residuals,
-            )
+            ),
+            progress,
         )  # fmt: skip
+    if progress is not None:
+        function("progress", progress)
     machine = as_machine(robot)
     roles, own = unknown_roles(unknown), words("per_session", per_session)
     fixed, find_datum = fixed_names(fix)
-    named = stated_uncertainty(uncertainty)
-    stated = machine.model.uncertainty.with_later(named)
+    named, of_file = stated_uncertainty(uncertainty), machine.model.uncertainty
     machine, moving, of_effects = effects_on(machine, effects)
     weighed, rule = loss_and_rule(loss)
     given = as_fit_data(machine, measurements, roles, bool(own), moving)
     of_machine = partial(
         of_the_machine, coefficients=coefficients(given), names=machine.geometry.names
     )
+    named = replace(named, roles=roles_of(given))
+    stated = of_file.with_later(named)
     given, uncertain = uncertain_sets(machine, with_held(given, fixed), stated)
     asked = Asked(
-        None if free is None else of_machine(words("free", free)), prior, bounds, own,
-        by_set(roles), of_machine(fixed),
+        None if free is None else of_machine("free", words("free", free)), prior, bounds, own,
+        by_set(roles, given), of_machine("fix", fixed),
         of_effects=of_effects, uncertainty=stated, uncertain_roles=uncertain,
         residuals=checked_residuals(residuals),
     )  # fmt: skip
     dropped, drop_outliers, drop_slack = left_out(drop, sum(len(data.rows) for data in given))
     rows = prepare(machine, given, holdout, dropped, bool(own))
-    chosen = parameters(machine, rows.fitted, asked)
-    require_used(named, chosen)
-    problem = begin(rows, chosen)
-    try:
-        if drop_outliers:
-            rows, problem = without_outliers(rows, problem, chosen)
-        if drop_slack:
-            problem = without_slack(problem)
-        fit = solve(problem, weighed, rule)
-        if find_datum:
-            fit = with_datum(fit, rows, asked)
-    except FitError as error:
-        hint = likely_mistakes(rows.fitted, chosen, problem.start)
-        if not hint and not problem.start.ok:
-            hint = ["check units, signs and columns of their actuators, or leave these rows out"]
-        raise ArgumentError("; ".join([f"measurements: {error}", *hint])) from None
-    fit = with_component_noise(fit)
-    rows, held = compare(rows, fit, drop_outliers)
-    found = result(rows, fit, held, find_slack=not drop_slack)
-    for text in found.warnings:
+    with telling(progress):
+        chosen = parameters(machine, rows.fitted, asked)
+        require_used(named, chosen)
+        part(0.02)
+        start = None
+        try:
+            equations, start = begin(rows, chosen, weighed)
+            if drop_outliers:
+                part(0.25)
+                rows = without_outliers(rows, equations, start)
+                equations, start = begin(rows, chosen, weighed)
+            if drop_slack:
+                part(0.3)
+            equations, slack = without_slack(equations, start) if drop_slack else (equations, ())
+            part(0.5)
+            fit = solve(equations, start, weighed, rule, slack)
+            if find_datum:
+                part(0.6)
+                fit = with_datum(fit, rows)
+        except FitError as error:
+            hint = likely_mistakes(rows.fitted, chosen, start)
+            if not hint and start is not None and not start.ok:
+                hint = [
+                    "check units, signs and columns of their actuators, or leave these rows out"
+                ]
+            raise ArgumentError("; ".join([f"measurements: {error}", *hint])) from None
+        part(0.65)
+        fit = with_component_noise(fit)
+        part(0.8)
+        rows, held = compare(rows, fit, drop_outliers)
+        part(0.95)
+        found = result(rows, fit, held, find_slack=not drop_slack)
+        texts = found.warnings
+    for text in texts:
         warnings.warn(text, CalibrationWarning, stacklevel=3)  # of who called, beyond the adapter
     return cast("Identification[Given]", found)  # an arm for an arm
 
 
-def _automatic(identified: Callable[..., Identification[Given]]) -> Identification[Given]:
+def _automatic(
+    identified: Callable[..., Identification[Given]], progress: Progress | None
+) -> Identification[Given]:
     """The calibration with the sag that helps at poses left out, or else without."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", CalibrationWarning)
-        found = identified(effects=())
-    helps = sag_that_helps(found.fit)
+        found = identified(effects=(), progress=within(progress, 0.0, 0.4))
+    with telling(within(progress, 0.4, 0.6)):
+        part(0.9)
+        helps = sag_that_helps(found.fit)
     if helps is not None:
-        return identified(effects=[helps.effect])
+        return identified(effects=[helps.effect], progress=within(progress, 0.6, 1.0))
+    if progress is not None:
+        progress(PERCENT, PERCENT)
     for text in found.warnings:
         warnings.warn(text, CalibrationWarning, stacklevel=4)  # of who called, beyond the adapter
     return found

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pkmcal.arms.arm import SerialArm
 from pkmcal.estimation.begin import begun, estimator_at
 from pkmcal.estimation.free_parameters import parameters
+from pkmcal.estimation.solving import solve
 from pkmcal.fitted.left_out import Comparison, compared_by_poses
 from pkmcal.fitted.solution import Solution
 from pkmcal.kinematics.arm_machine import ArmMachine
@@ -64,8 +65,8 @@ def _refitted(found: Solution) -> SerialArm:
     own = [name for name in chosen.names if name in machine.geometry.names]
     asked = replace(chosen.asked, free=own, of_effects={})
     rigid = parameters(machine, equations.prediction.datasets, asked)
-    whole, exact, start = begun(equations.prediction.datasets, rigid, equations.missing)
-    end = estimator_at(whole, exact, start, found.fit.estimate.state.loss.name).solve()
+    whole, start = begun(equations.prediction.datasets, rigid, equations.missing)
+    end = solve(estimator_at(whole, start, found.fit.estimate.state.loss))
     theta = end.evaluation.theta
     arm = as_given(machine.replace(rigid.values_at(theta)))
     assert isinstance(arm, SerialArm)

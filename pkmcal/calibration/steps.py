@@ -3,7 +3,7 @@
     prepare → begin → without_outliers → without_slack → solve → with_datum → with_component_noise
             → compare → result
 
-`Rows` says which rows there are, `Problem` what is solved, `Fit` what came of it.
+`Rows` says which rows there are, `Fit` what came of them.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import numpy as np
 
 from pkmcal.arms.arm import SerialArm
 from pkmcal.calibration.identification import Identification
+from pkmcal.estimation import solving
 from pkmcal.estimation.begin import begun, estimator_at
 from pkmcal.estimation.datasets import as_fitted, informative
 from pkmcal.estimation.equations import Equations
@@ -24,15 +25,16 @@ from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.free_parameters import parameters
 from pkmcal.estimation.loss import LossName
+from pkmcal.estimation.other_starts import likelier_start
 from pkmcal.estimation.own_classes import require_true
-from pkmcal.estimation.parameters import Asked, Parameters
+from pkmcal.estimation.parameters import Parameters
 from pkmcal.estimation.pose_minima import solved_in_least_minima
-from pkmcal.estimation.starts import known_distances
+from pkmcal.estimation.starts import stated_beside
 from pkmcal.estimation.unlike_components import unlike_components
 from pkmcal.exceptions import ArgumentError
 from pkmcal.fitted.datum import datum as choose_datum
 from pkmcal.fitted.dropped import held_without, robust_outliers, without
-from pkmcal.fitted.fit import Fit, Problem
+from pkmcal.fitted.fit import Fit
 from pkmcal.fitted.fit_statistics import (
     identifiability,
     misfit,
@@ -120,7 +122,7 @@ def prepare(
         pairs = [draw(data, holdout) for data in fitted]
         fitted, held = [kept for kept, _ in pairs], [(out, i) for i, (_, out) in enumerate(pairs)]
     rows = Rows(machine, given, fitted, held, drawn, missing).without(dropped)
-    return replace(rows, fitted=[*rows.fitted, *known_distances(list(rows.fitted))])
+    return replace(rows, fitted=[*rows.fitted, *stated_beside(list(rows.fitted))])
 
 
 def _require_apart(held: Sequence[tuple[FitData, int]], fitted: Sequence[FitData]) -> None:
@@ -131,66 +133,82 @@ def _require_apart(held: Sequence[tuple[FitData, int]], fitted: Sequence[FitData
             raise ArgumentError(f"holdout: {reason}")
 
 
-def begin(rows: Rows, chosen: Parameters) -> Problem:
-    """State the problem at the nominal machine."""
-    problem = Problem(*begun(rows.fitted, chosen, rows.missing))
-    if rows.held and problem.equations.machines.cells:
+def begin(rows: Rows, chosen: Parameters, loss: LossName) -> tuple[Equations, Evaluation]:
+    """The equations of the fitted rows, and these at the nominal machine: `Fit.aligned`."""
+    equations, start = begun(rows.fitted, chosen, rows.missing)
+    if rows.held and equations.machines.cells:
         raise ArgumentError("holdout: rows whose tensions are unknown are all fitted: leave it out")
-    _require_predictions(problem)
-    require_true(problem.exact.prediction, problem.start)
-    return problem
+    if start.ok:  # else frames are not laid yet, and a camera may see nothing
+        _require_predictions(equations, start)
+    require_true(equations.prediction, start)
+    equations.parameters.require_true_residuals(start.theta)
+    return equations, likelier_start(equations, start, loss)
 
 
-def _require_predictions(problem: Problem) -> None:
+def _require_predictions(equations: Equations, start: Evaluation) -> None:
     """Refuse a reading, or an effect, that gives no number where the machine is known to be."""
-    table, start = problem.exact.table, problem.start
-    for m, place, off in zip(table.sets, table.pose_of, start.residuals, strict=True):
+    prediction, table = equations.prediction, equations.table
+    for i, (m, place, off) in enumerate(
+        zip(table.sets, table.pose_of, start.residuals, strict=True)
+    ):
         read = np.isfinite(m.values.reshape(off.shape))
         silent = (read & ~np.isfinite(off)).any(axis=1) & (start.status[place] == 0)
         if silent.any():
+            row = int(np.argmax(silent))
+            alone = prediction.unmoved(i, start.pose, start.theta).values[row]
+            why = f"predict of the class {type(m.instrument).__name__} gives NaN"
+            if np.isfinite(alone[read[row]]).all():
+                names = " or ".join(effect.name for effect in prediction.datasets[i].effects)
+                why = f"moved of {names} gives NaN"
             raise ArgumentError(
-                f"measurements: {m.kind}: nothing finite is predicted of row"
-                f" {int(np.argmax(silent))} of its set, though the machine's pose is known there:"
-                " its reading, or an effect, gives NaN"
+                f"measurements: {m.kind}: nothing finite is predicted of row {row} of its set,"
+                f" though the machine's pose is known there: {why}"
             )
 
 
-def without_outliers(rows: Rows, problem: Problem, chosen: Parameters) -> tuple[Rows, Problem]:
+def without_outliers(rows: Rows, equations: Equations, start: Evaluation) -> Rows:
     """Leave out rows that the others contradict in a robust fit.
 
     Before slack is looked for: a robust fit must not take an outlier for slack.
     """
-    rows = rows.without(robust_outliers(problem.equations, problem.exact, problem.start))
-    return rows, begin(rows, chosen)
+    return rows.without(robust_outliers(equations, start))
 
 
-def without_slack(problem: Problem) -> Problem:
-    """Leave out readings of cables that the others show to be slack."""
-    equations, cells = taut(problem.equations, problem.exact, problem.start)
-    return replace(problem.of(equations), slack=cells) if cells else problem
+def without_slack(equations: Equations, start: Evaluation) -> tuple[Equations, tuple[Cell, ...]]:
+    """Leave out readings of cables that the others show to be slack, and say which these are."""
+    fewer, cells = taut(equations, start)
+    return (fewer, cells) if cells else (equations, ())
 
 
-def solve(problem: Problem, loss: LossName, rule: CovarianceRule) -> Fit:
-    """Search from the start of the problem; an error where rows are not reached."""
-    estimator = estimator_at(problem.equations, problem.exact, problem.start, loss)
+def solve(
+    equations: Equations,
+    start: Evaluation,
+    loss: LossName,
+    rule: CovarianceRule,
+    slack: tuple[Cell, ...] = (),
+) -> Fit:
+    """Search from the start, without slack cables; an error where rows are not reached."""
+    estimator = estimator_at(equations, start, loss)
     estimate = solved_in_least_minima(estimator)
-    if failed := problem.equations.failures(estimate.evaluation):
+    if failed := equations.failures(estimate.evaluation):
         raise ArgumentError(f"{failed} where the search ended")
-    require_true(problem.equations.prediction, estimate.evaluation)
-    return Fit(problem, estimator, estimate, rule=rule)
+    require_true(equations.prediction, estimate.evaluation)
+    equations.parameters.require_true_residuals(estimate.evaluation.theta)
+    return Fit(start, estimator, estimate, slack, rule=rule)
 
 
-def with_datum(fit: Fit, rows: Rows, asked: Asked) -> Fit:
+def with_datum(fit: Fit, rows: Rows) -> Fit:
     """Hold numbers that only say where frames lie, and solve again; slack cables stay left out."""
     held = choose_datum(fit.estimator, fit.estimate)
     if not held.names:
         return replace(fit, datum=held)
-    problem = begin(rows, parameters(rows.machine, rows.fitted, held.asked(asked)))
-    if cells := fit.problem.slack:
-        keys = [(cell.pose, cell.closures[0]) for cell in cells]
-        equations = problem.equations.without_closures(keys, fit.estimate.evaluation)
-        problem = replace(problem.of(equations), slack=cells)
-    return replace(solve(problem, fit.estimator.loss, fit.rule), datum=held)
+    asked = held.asked(fit.estimator.equations.parameters.asked)
+    chosen = parameters(rows.machine, rows.fitted, asked)
+    equations, start = begin(rows, chosen, fit.estimator.loss)
+    if fit.slack:
+        keys = [(cell.pose, cell.closures[0]) for cell in fit.slack]
+        equations = equations.without_closures(keys, fit.estimate.evaluation)
+    return replace(solve(equations, start, fit.estimator.loss, fit.rule, fit.slack), datum=held)
 
 
 def with_component_noise(fit: Fit) -> Fit:
@@ -200,19 +218,22 @@ def with_component_noise(fit: Fit) -> Fit:
     if unlike is None:
         return fit
     classes, deviations = unlike
-    problem = fit.problem.of(fit.problem.equations.reweighted(deviations))
-    again = Estimator(problem.equations, estimator.start, estimator.loss)
+    again = Estimator.of(
+        estimator.equations.reweighted(deviations), estimator.start, estimator.loss
+    )
     try:
-        estimate = again.solve(estimate.evaluation)
+        estimate = solving.solve(again, estimate.evaluation)
     except ArgumentError:  # grossly off: what there is says more than an error
         return fit
-    if problem.equations.failures(estimate.evaluation):
+    if again.equations.failures(estimate.evaluation):
         return fit
-    return replace(fit, problem=problem, estimator=again, estimate=estimate, classes=classes)
+    return replace(fit, estimator=again, estimate=estimate, classes=classes)
 
 
-def compare(rows: Rows, fit: Fit, outliers: bool) -> tuple[Rows, HeldOut]:
+def compare(rows: Rows, fit: Fit, outliers: bool) -> tuple[Rows, HeldOut | None]:
     """Compare the points held out; with `outliers` without those that are off where few are."""
+    if not rows.held:
+        return rows, None
     held = evaluate(rows.held, fit.estimator, fit.estimate, fit.uncertainty, fit.start.theta)
     odd = held.holdout_outliers
     if outliers and odd and not held.holdout_contradicts:
@@ -226,22 +247,21 @@ def compare(rows: Rows, fit: Fit, outliers: bool) -> tuple[Rows, HeldOut]:
     return rows, replace(held, holdout_drawn=rows.drawn)
 
 
-def result(rows: Rows, fit: Fit, held: HeldOut, find_slack: bool) -> Identification:
+def result(rows: Rows, fit: Fit, held: HeldOut | None, find_slack: bool) -> Identification:
     """Set all numbers, once; with `find_slack` also which cables the fit shows to be slack."""
-    estimator, estimate, problem, sure = fit.estimator, fit.estimate, fit.problem, fit.uncertainty
+    estimator, estimate, sure = fit.estimator, fit.estimate, fit.uncertainty
     chosen = estimator.equations.parameters
-    robots = _robots(problem.exact, estimate.evaluation)
-    fits = misfit(estimator, estimate, sure, (fit.start, fit.end))
-    cells = _found_slack(problem) if find_slack and fits["outliers"] else problem.slack
-    table = parameter_table(estimator, estimate, sure)
+    robots = _robots(estimator.equations, estimate.evaluation)
+    fits = misfit(estimator, estimate, sure, (fit.start, fit.end), fit.before)
+    cells = _found_slack(fit) if find_slack and fits["outliers"] else fit.slack
+    table = parameter_table(estimator, estimate, sure, fit.start.theta)
     return Identification(
         **table,
         **identifiability(estimator, estimate, len(chosen) - len(table["free"])),
         **fits,
-        **vars(held),
+        **({} if held is None else vars(held)),
         converged=estimate.converged,
         evaluations=estimate.evaluations,
-        history=estimate.history,
         robot=robots[chosen.sessions[-1] if chosen.sessions else ""],
         robots=_of_sessions(robots, held),
         prior_test=tested_prior(estimator, estimate),
@@ -255,19 +275,19 @@ def result(rows: Rows, fit: Fit, held: HeldOut, find_slack: bool) -> Identificat
     )
 
 
-def _found_slack(problem: Problem) -> tuple[Cell, ...]:
+def _found_slack(fit: Fit) -> tuple[Cell, ...]:
     """Readings of slack cables; none where a robust fit does not come to an end."""
     with suppress(ArgumentError):
-        return taut(problem.equations, problem.exact, problem.start)[1]
+        return taut(fit.estimator.equations, fit.aligned)[1]
     return ()
 
 
 def _of_sessions(
-    robots: Mapping[str, Robot | SerialArm], held: HeldOut
+    robots: Mapping[str, Robot | SerialArm], held: HeldOut | None
 ) -> dict[str, Robot | SerialArm]:
     """The machines of all sessions by name, those that were held out with them."""
     found = {name: robot for name, robot in robots.items() if name}
-    if found and held.holdout_later is not None and held.holdout_end is not None:
+    if found and held is not None and held.holdout_later and held.holdout_end:
         chosen = held.holdout_later.parameters
         for name in chosen.sessions:
             if name not in found:
@@ -276,15 +296,15 @@ def _of_sessions(
     return found
 
 
-def _robots(commanded: Equations, end: Evaluation) -> dict[str, Robot | SerialArm]:
+def _robots(equations: Equations, end: Evaluation) -> dict[str, Robot | SerialArm]:
     """The machine of each session, "" where there are none, at the parameters of an evaluation."""
-    chosen, found = commanded.parameters, {}
+    chosen, found = equations.parameters, {}
     for session in chosen.sessions or ("",):
         columns = chosen.geometry_of(session)
         robot = as_given(chosen.robot.replace(chosen.values_at(end.theta, columns)))
-        table = commanded.table
+        table = equations.table
         own = (table.machine_columns == columns).all(axis=1)[table.machine_of_pose]
         if isinstance(robot, Robot):
-            robot = robot.closing(commanded.table.actuators[own], end.pose[own])
+            robot = robot.closing(table.actuators[own], end.pose[own])
         found[session] = robot
     return found

@@ -70,7 +70,7 @@ def coaxial(arm: SerialArm) -> Iterator[Finding]:
     """Neighbours on one axis, of which the second moves nothing that the first does not."""
     screws = arm.screws / np.array([1.0, 1.0, 1.0, *(arm.length,) * 3])
     for i, (one, other) in enumerate(pairwise(screws), 1):
-        if arm.kinds[i - 1] != arm.kinds[i]:
+        if arm.kinds[i - 1] != arm.kinds[i] or i not in arm.followers.driven:
             continue
         turning = arm.kinds[i] == "revolute"
         size = 1.0 if turning else 1.0 / arm.length

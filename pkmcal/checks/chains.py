@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 
 from pkmcal.arrays import FloatArray
 from pkmcal.checks.finding import Finding, named
 from pkmcal.checks.function import outside_workspace, singular, turning
-from pkmcal.geometry.chain_joints import Joint
+from pkmcal.geometry.chain_joints import Joint, axes_along_rods
 from pkmcal.geometry.chains import Chains
 from pkmcal.kinematics import pose_steps
 from pkmcal.kinematics.robot import Robot
@@ -19,7 +19,6 @@ _NEAR = 0.1  # of the distance: a home value that is meant to be it
 _EXACT = 1e-3  # mm
 _AXIS = 0.02  # entries of a direction that are shown as 0
 _TURNS = 4 * np.pi  # rad: no joint of a limb turns further
-_ORDINALS = ("first", "second")
 
 
 def mobility(robot: Robot) -> Iterator[Finding]:
@@ -92,30 +91,15 @@ def stroke_units(robot: Robot) -> Iterator[Finding]:
 
 def along_its_rod(robot: Robot) -> Iterator[Finding]:
     """Axes of a U that lie along the rod beside it, which they turn about itself."""
-    for i, k, joint in _joints(robot):
-        limb = _chains(robot).limbs[i]
-        for rod in (_rod(joint, limb[k + 1 :]), _rod(joint, limb[:k][::-1])):
-            if joint.kind != "U" or rod is None:
-                continue
-            for n, axis in enumerate(joint.axes):
-                if float(np.linalg.norm(np.cross(axis, rod))) < _AXIS:
-                    yield Finding(
-                        "axis",
-                        (i + 1,),
-                        f"the {_ORDINALS[n]} axis of the U {_chains(robot).name_of(i, k)} lies"
-                        " along its rod, which it turns about itself",
-                        "give the U two axes across the rod; a rod that has to turn about itself"
-                        " is an R",
-                    )
-
-
-def _rod(joint: Joint, others: Sequence[Joint]) -> FloatArray | None:
-    """The direction (3,) to the first of other joints that is elsewhere and no slide."""
-    for other in others:
-        way = other.at - joint.at
-        if other.kind != "P" and np.linalg.norm(way) > _EXACT:
-            return np.asarray(way / np.linalg.norm(way))
-    return None
+    for i, limb in enumerate(_chains(robot).limbs):
+        for k, ordinal in axes_along_rods(limb, _AXIS):
+            yield Finding(
+                "axis",
+                (i + 1,),
+                f"the {ordinal} axis of the U {_chains(robot).name_of(i, k)} lies"
+                " along its rod, which it turns about itself",
+                "give the U two axes across the rod; a rod that has to turn about itself is an R",
+            )
 
 
 def axes_in_line(robot: Robot) -> Iterator[Finding]:

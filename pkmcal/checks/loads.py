@@ -81,7 +81,7 @@ def arm_sags(arm: SerialArm) -> Iterator[Finding]:
     if not arm.laws.yielding:
         return
     turning = np.array([unit == "rad" for unit in arm.actuator_units])
-    postures = np.random.default_rng(0).uniform(-np.pi, np.pi, (_POSTURES, arm.n_joints)) * turning
+    postures = np.random.default_rng(0).uniform(-np.pi, np.pi, (_POSTURES, len(turning))) * turning
     moved = arm.forward(postures)[:, :3, 3] - arm.rigid.forward(postures)[:, :3, 3]
     sags = np.linalg.norm(moved, axis=1)
     sag = float(np.median(np.where(np.isfinite(sags), sags, np.inf)))  # NaN: it gives way

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from pkmcal.cli import interrupt
 from pkmcal.cli.output import say
 from pkmcal.exceptions import ArgumentError
 
@@ -49,5 +50,6 @@ def app(
         raise ArgumentError(
             f"pkmcal app needs {missing}: python -m pip install starlette uvicorn"
         ) from None
-    launch(folder, say, browser, port)
+    with interrupt.lost_connections_are_errors():  # of tabs that are closed, of what it started
+        launch(folder, say, browser, port)
     return 0

@@ -284,8 +284,8 @@ def carried_out(job: Calibration, asked: Writing, json: bool) -> int:
     sources = calibrating.read(job, inputs, tell)
     arguments = calibrating.arguments(job, sources, tell)
     written = Written.planned(asked, job.robot, sources.robot, sources.measured, inputs)
-    with progress("identifying"):
-        found = calibrating.identified(sources, arguments)
+    with progress("identifying") as moved:
+        found = calibrating.identified(sources, arguments, moved)
     rigid = None
     if written.machine is not None:
         with progress("picture"):

@@ -12,6 +12,7 @@ from pkmcal.cli.options import Force, Json, ParallelRobot, Radians
 from pkmcal.cli.output import say
 from pkmcal.cli.rows import POSE_UNITS, table
 from pkmcal.cli.taken import Taken
+from pkmcal.core.library import POSE
 from pkmcal.jobs.inputs import Inputs
 from pkmcal.jobs.load_options import carrying
 from pkmcal.jobs.output import Output
@@ -61,7 +62,7 @@ def inverse(
     """
     read = Inputs()
     machine = carrying(load_parallel(read.robot(robot)), payload, payload_at, tool_force)
-    row = numbers_on_line("poses", poses, POSE_UNITS, rad)
+    row = numbers_on_line("poses", poses, POSE_UNITS, rad, POSE)
     rows = read_poses(read.file(poses), machine) if row is None else row
     output = None if out is None else Output(out, ["commands.csv"], read, force)
     taken = Taken.of(machine, rows, match)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import signal
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from pkmcal.cli import interrupt
 from pkmcal.cli.options import Free, Prior, RobotOrArm, Seed
 from pkmcal.cli.output import say, tell
 from pkmcal.exceptions import ArgumentError, Error, words_of
@@ -193,7 +192,7 @@ def measure(
             f"--machine: what is driven; it has {registry.words(registry.MACHINES)}; or --replay"
         )
     rules = Rules(feed, dwell, repeats, safe_height)
-    with _told_of_lost_connections():
+    with interrupt.lost_connections_are_errors():
         measurement = measuring.driven(job, machine, instrument, rules, str(out), inputs, tell)
         try:
             return _measured(measurement, job, out)
@@ -222,18 +221,6 @@ def _measured(measurement: Driven, job: Planning, out: Path) -> int:
     code = _ended(last[-1])
     say(quoted(command("calibrate", [job.robot, str(out)], [])))
     return code
-
-
-@contextmanager
-def _told_of_lost_connections() -> Iterator[None]:
-    """A connection that is gone is an error that is told, not the end of this process."""
-    number = getattr(signal, "SIGPIPE", None)  # which ends a program whose output nobody reads
-    before = None if number is None else signal.signal(number, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        if number is not None:
-            signal.signal(number, before)
 
 
 def _started() -> bool:

@@ -24,7 +24,7 @@ JoinBy = Annotated[
         rich_help_panel=READING,
         metavar="WORD",
         help="How rows of the log are found: name, row, time; or auto. row+1: of a log that is a"
-        " row late, the row after.",
+        " row late, the row after, also within one file.",
     ),
 ]
 Ignore = Annotated[

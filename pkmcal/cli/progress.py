@@ -7,7 +7,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from pkmcal.error_model.monte_carlo import Progress
+from pkmcal.progress import Progress
 
 _TAKEN_FOR_ONE = {"FORCE_COLOR", "TTY_COMPATIBLE"}  # by rich, which takes long to import
 

@@ -14,6 +14,7 @@ from pkmcal.cli.load_options import Payload, PayloadAt, ToolForce, Yielding
 from pkmcal.cli.options import Force, Json, ParallelRobot, Radians, Seed
 from pkmcal.cli.output import say
 from pkmcal.cli.rows import POSE_UNITS
+from pkmcal.core.library import POSE
 from pkmcal.jobs.inputs import Inputs
 from pkmcal.jobs.load_options import carrying, three, yielding
 from pkmcal.jobs.output import Output
@@ -74,7 +75,7 @@ def stiffness(
     if poses is None:
         rows, one = pk.sample_poses(machine.rigid, _DRAWN, seed=seed), False
     else:
-        row = numbers_on_line("poses", poses, POSE_UNITS, rad)
+        row = numbers_on_line("poses", poses, POSE_UNITS, rad, POSE)
         rows, one = (read_poses(read.file(poses), machine), False) if row is None else (row, True)
     found = pk.stiffness(machine, rows)
     moved = None if cut is None else found.displacement(three("--cut", cut))

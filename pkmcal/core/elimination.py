@@ -51,6 +51,8 @@ class PoseEquations:
 
     Attributes
     ----------
+    first : ndarray of int (K + 1,)
+        Where those of each pose begin in `order`, and where the last ones end.
     left_of : ndarray of int (K,)
         How many equations are left of each pose.
     place : ndarray of int (K,)
@@ -71,11 +73,24 @@ class PoseEquations:
 
     def __init__(self, order: IntArray, count: IntArray, unknowns: int, isa: int = ISA) -> None:
         self.order, self.unknowns, self._isa = order.astype(np.int64, copy=False), unknowns, isa
-        self._first = np.concatenate([[0], np.cumsum(count)]).astype(np.int64)
+        self.first = np.concatenate([[0], np.cumsum(count)]).astype(np.int64)
         self._poses, self._most = len(count), int(count.max(initial=0))
         self.left_of: IntArray = np.maximum(count - unknowns, 0)
         self.place = (np.cumsum(self.left_of) - self.left_of).astype(np.int64)
         self._left = int(self.left_of.sum())
+
+    @classmethod
+    def of(cls, pose_of: IntArray, poses: int, unknowns: int) -> PoseEquations:
+        """The equations of poses, of which each is of one (E,)."""
+        count = np.bincount(pose_of, minlength=poses)
+        return cls(np.argsort(pose_of, kind="stable"), count, unknowns)
+
+    @property
+    def pose_of(self) -> IntArray:
+        """The pose of each equation (E,)."""
+        found = np.empty(len(self.order), dtype=np.intp)
+        found[self.order] = np.repeat(np.arange(self._poses), np.diff(self.first))
+        return found
 
     def _work(self) -> FloatArray:
         u = self.unknowns
@@ -90,7 +105,7 @@ class PoseEquations:
         given = (
             n,
             u,
-            self._first,
+            self.first,
             self.order,
             np.ascontiguousarray(residual),
             np.ascontiguousarray(by_unknown),
@@ -106,7 +121,7 @@ class PoseEquations:
         """
         n, u = self._poses, self.unknowns
         found = np.empty((n, u, u))
-        given = n, u, self._first, self.order, np.ascontiguousarray(rows)
+        given = n, u, self.first, self.order, np.ascontiguousarray(rows)
         call("pose_triangle", *given, found, self._work(), isa=self._isa)
         return found
 
@@ -126,7 +141,7 @@ class PoseEquations:
         n, u = self._poses, self.unknowns
         found = Fit(np.empty((n, u)), np.empty(n), np.empty(n), np.empty(self._left))
         given = np.ascontiguousarray(residual), np.ascontiguousarray(by_unknown), damping
-        order = self._first, self.order, *given, least, rounding, self.place
+        order = self.first, self.order, *given, least, rounding, self.place
         call("pose_fit", n, u, *order, *found, self._work(), isa=self._isa)
         return found
 
@@ -139,7 +154,7 @@ class PoseEquations:
         n, u, columns = self._poses, self.unknowns, part.shape[1]
         left, following = np.empty((self._left, columns)), np.empty((n, u, columns))
         equations = np.ascontiguousarray(by_unknown), columns, np.ascontiguousarray(part)
-        given = (n, u, self._first, self.order, *equations, self.place)
+        given = (n, u, self.first, self.order, *equations, self.place)
         call("pose_left", *given, left, following, self._work(), isa=self._isa)
         return left, following
 
@@ -150,7 +165,7 @@ class PoseEquations:
         given = (
             n,
             u,
-            self._first,
+            self.first,
             self.order,
             np.ascontiguousarray(by_unknown),
             columns,

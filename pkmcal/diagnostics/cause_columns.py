@@ -11,18 +11,24 @@ import numpy as np
 from pkmcal import screw
 from pkmcal.arrays import BoolArray, FloatArray, IntArray, lots
 from pkmcal.diagnostics.columns import of_actuators, of_poses, of_rows
+from pkmcal.diagnostics.visits import visits_of
 from pkmcal.effects.gears import Coupling, Harmonics
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.exceptions import ArgumentError
 from pkmcal.fitted.fit import Fit
 from pkmcal.fitted.held_numbers import bound_names, bound_numbers
 from pkmcal.fitted.left_out import effect_columns
+from pkmcal.fitted.solution import Solution
 from pkmcal.geometry.stated_uncertainty import SCALE, StatedUncertainty
 from pkmcal.kinematics.calibratable import Calibratable, as_arm
 from pkmcal.readings.predicted import Predicted
 from pkmcal.readings.reading import HeldNumbers
+from pkmcal.statistics.linear_fit import column_basis
 from pkmcal.statistics.score_test import Columns
 
+LAG = "lag: readings before the machine stood still"
+WARMING = "a machine that grew warmer in the course of measuring"
+_BY_PLACE = 0.5  # of the order's variance that the place explains, from which both look alike
 _LEAST_TRAVEL = 0.02  # of the machine's length, from which a place is more than an error
 _WRIST = ((5, 4), (6, 4), (6, 5))  # joints that gears couple, and those by which
 _LEAST_WAY = 1e-9  # of the machine's length, below which actuators have not moved
@@ -63,28 +69,6 @@ def _at(fit: Fit) -> Evaluation:
     return fit.estimate.evaluation
 
 
-def _before(fit: Fit) -> IntArray:
-    """The pose from which the machine came to each, in the order of measuring; itself at first.
-
-    Of a pose where it was several times, at the last of them.
-    """
-    equations = fit.uncertainty.equations
-    before = np.arange(len(_at(fit).pose))
-    for i, data in enumerate(equations.prediction.datasets):
-        m = data.measured
-        time = np.arange(len(m)) if m.time is None else m.time
-        session = (
-            np.zeros(len(m)) if m.session is None else np.unique(m.session, return_inverse=True)[1]
-        )
-        order = np.lexsort((time, session))
-        pose, session = equations.table.pose_of[i][order], session[order]
-        new = (np.diff(pose, prepend=-1) != 0) | (np.diff(session, prepend=-1) != 0)
-        pose, session = pose[new], session[new]
-        came = np.flatnonzero(np.diff(session) == 0)
-        before[pose[came + 1]] = pose[came]
-    return before
-
-
 def _travelled(fit: Fit, ways: FloatArray) -> BoolArray:
     """Along which axes (d,) the machine has travelled.
 
@@ -94,36 +78,92 @@ def _travelled(fit: Fit, ways: FloatArray) -> BoolArray:
     return travelled
 
 
-def _lag(fit: Fit) -> Columns:
-    """The platform was still on its way: a part of the way back to the pose before."""
-    before, pose = _before(fit), _at(fit).pose
-    twist = np.empty((len(pose), 6))
-    for own in lots(len(pose)):
-        back = screw.from_pose(pose[before[own]]) @ np.linalg.inv(screw.from_pose(pose[own]))
+def of_lag(fit: Fit, actuators: FloatArray, place: IntArray) -> Columns:
+    """Readings that are off by a share of the way to other places.
+
+    These are actuator readings, rows `place` (N,) of `actuators` (K, n).
+    """
+    table, end = fit.equations.table, _at(fit)
+    first = np.cumsum([0, *map(len, table.sets)])
+
+    def change(i: int, rows: slice, seen: Predicted) -> FloatArray:
+        way = actuators[place[first[i] : first[i + 1]][rows]] - table.sets[i].actuators[rows]
+        twists = end.machines.actuator_twists(end.states, table.pose_of[i][rows])
+        return seen.by_twist @ (twists @ way[:, :, None])
+
+    return of_rows(fit, change)
+
+
+def _of_ways(found: Solution) -> Iterator[Cause]:
+    """Causes by the way that the machine came to each pose, also from those that are held out."""
+    visits, table = visits_of(found), found.fit.uncertainty.equations.table
+    pose, fitted = np.concatenate(table.pose_of), visits.before < len(visits.before)
+    way = np.zeros_like(table.actuators)
+    way[pose] = table.actuators[pose] - visits.actuators[visits.before]
+    before = np.full(len(way), -1)
+    before[pose[fitted]] = pose[visits.before[fitted]]
+
+    yield Cause(LAG, "wait longer before a reading", lambda fit: _lag(fit, way, before))
+    yield Cause(
+        "play of the drives or hysteresis of cables",
+        "state approach and find drive*.backlash, or actuator_sigma",
+        lambda fit: _play(fit, way),
+    )
+
+
+def _lag(fit: Fit, way: FloatArray, before: IntArray) -> Columns:
+    """The platform was still on its way: a part of the way back to the pose before.
+
+    Actuators came by `way` (K, n) from pose `before` (K,), which is -1 where it was held out.
+    """
+    end = _at(fit)
+    twist = np.empty((len(before), 6))
+    for own in lots(len(before)):
+        back = screw.from_pose(end.pose[before[own]]) @ np.linalg.inv(
+            screw.from_pose(end.pose[own])
+        )
         twist[own, :3] = screw.log(back)[:, :3]
-        twist[own, 3:] = pose[before[own], :3] - pose[own, :3]
-    arcs = twist * np.repeat([_at(fit).robot.length, 1.0], 3)
-    twist = np.where(_travelled(fit, arcs), twist, 0.0)
+        twist[own, 3:] = end.pose[before[own], :3] - end.pose[own, :3]
+    unknown = np.flatnonzero(before < 0)
+    turned = end.machines.actuator_twists(end.states, unknown) @ way[unknown][:, :, None]
+    twist[unknown] = -turned[:, :, 0]
+    stayed = ~_travelled(fit, twist * np.repeat([end.robot.length, 1.0], 3))
+    twist[:, stayed] = 0.0
     return of_poses(fit, lambda poses: twist[poses][:, :, None])
 
 
-def _play(fit: Fit) -> Columns | None:
+def _play(fit: Fit, way: FloatArray) -> Columns | None:
     """Each actuator stops short of where it was to go, by the direction it came from."""
-    q = fit.uncertainty.equations.table.actuators
-    way = q - q[_before(fit)]
     least = _LEAST_WAY * _at(fit).robot.length
     return _by_each_actuator(fit, np.sign(np.where(np.abs(way) > least, way, 0.0)))
 
 
 def _warming(fit: Fit) -> Columns | None:
     """All actuators become longer alike while it is measured."""
-    equations, count = fit.uncertainty.equations, len(_at(fit).pose)
-    when = np.zeros(count)
+    return _by_all_actuators(fit, _order(fit)[:, None])
+
+
+def _order(fit: Fit) -> FloatArray:
+    """When each pose (K,) was measured, or in which row."""
+    equations, when = fit.uncertainty.equations, np.zeros(len(_at(fit).pose))
     for i, data in enumerate(equations.prediction.datasets):
         m = data.measured
         time = data.rows.astype(float) if m.time is None else m.time
         when[equations.table.pose_of[i]] = time
-    return _by_all_actuators(fit, when[:, None])
+    return when
+
+
+def place_after_place(fit: Fit) -> bool:
+    """Return whether the order of measuring is much the same as the place, as of a raster."""
+    place, when = _at(fit).pose[:, :3], _order(fit)
+    place, when = place - place.mean(axis=0), when - when.mean()
+    products = [place[:, i] * place[:, j] for i in range(3) for j in range(i, 3)]
+    basis = column_basis(np.column_stack([np.ones(len(place)), place, *products]))
+    freedom, whole = len(place) - basis.shape[1], float(when @ when)
+    if freedom < 1 or not whole > 0.0:
+        return False
+    missed = when - basis @ (basis.T @ when)
+    return bool(1.0 - float(missed @ missed) / freedom / (whole / (len(place) - 1)) > _BY_PLACE)
 
 
 def _by_place(fit: Fit) -> Columns | None:
@@ -210,8 +250,11 @@ def _some(pattern: str, names: object) -> bool:
 def _of_arm(fit: Fit) -> Iterator[Cause]:
     """Causes of an arm: a wave a turn of each joint, and each coupling of its wrist.
 
-    One by one, since a test of many numbers is weak where one of them is wrong.
+    One by one, since a test of many numbers is weak where one of them is wrong. Joints that follow
+    others do so by a ratio that may be wrong, which looks like waves of both.
     """
+    for cause, ratio in ratios_of_followers(fit.parameters.robot):
+        yield Cause(cause, f"--effects {ratio.option}", _of_effect(ratio))
     waves = waves_a_turn(fit.parameters.robot)
     for wave in waves:
         name = f"an eccentric encoder or a tilted axis of joint {wave.joints}: a wave a turn"
@@ -219,7 +262,18 @@ def _of_arm(fit: Fit) -> Iterator[Cause]:
     for joint, other in _WRIST if waves else ():
         coupled = Coupling(((joint, other),))
         name = f"coupled joints of the wrist: joint {joint} turns along with joint {other}"
-        yield Cause(name, f"--effects coupling={joint}.{other}", _of_effect(coupled))
+        yield Cause(name, f"--effects {coupled.option}", _of_effect(coupled))
+
+
+def ratios_of_followers(machine: Calibratable) -> list[tuple[str, Coupling]]:
+    """Ratios by which joints follow others, as causes and as effects that find how wrong."""
+    arm = as_arm(machine)
+    table = {} if arm is None else arm.followers.table() or {}
+    return [
+        (f"a wrong ratio by which joint {joint} follows joint {other}", Coupling(((joint, other),)))
+        for joint, leaders in table.items()
+        for other in leaders
+    ]
 
 
 def waves_a_turn(machine: Calibratable) -> list[Harmonics]:
@@ -273,12 +327,8 @@ def _held(held: HeldNumbers) -> Callable[[Fit], Columns | None]:
 
 
 CAUSES = (
-    Cause("lag: readings before the machine stood still", "wait longer before a reading", _lag),
     Cause(
-        "play of the drives", "state approach and find drive*.backlash, or actuator_sigma", _play
-    ),
-    Cause(
-        "a machine that grew warmer in the course of measuring",
+        WARMING,
         "warm it up, or repeat poses and find offsets per session",
         _warming,
     ),
@@ -298,14 +348,16 @@ CAUSES = (
 )  # fmt: skip
 
 
-def possible(fit: Fit) -> Iterator[tuple[Cause, Columns]]:
+def possible(found: Solution) -> Iterator[tuple[Cause, Columns]]:
     """All causes and their columns in this fit."""
-    yield from _with_columns(fit, (*CAUSES, *_of_instruments(fit), *_of_arm(fit)))
+    fit = found.fit
+    several = (*_of_ways(found), *CAUSES, *_of_instruments(fit), *_of_arm(fit))
+    yield from _with_columns(fit, several)
 
 
-def of_instruments_alone(fit: Fit) -> Iterator[tuple[Cause, Columns]]:
+def of_instruments_alone(found: Solution) -> Iterator[tuple[Cause, Columns]]:
     """The causes of instruments and their columns in this fit."""
-    yield from _with_columns(fit, _of_instruments(fit))
+    yield from _with_columns(found.fit, _of_instruments(found.fit))
 
 
 def _with_columns(fit: Fit, several: Iterable[Cause]) -> Iterator[tuple[Cause, Columns]]:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Generic, Literal, TypeVar
 
-from pkmcal.arguments import shown
+from pkmcal.arguments import function, instance, shown, words
 from pkmcal.estimation.loss import LIMITS
 from pkmcal.exceptions import ArgumentError
 from pkmcal.fitted.solution import Solution
@@ -54,7 +54,7 @@ class Remedy:
     {'loss': ('cluster', 'cauchy')}
     >>> import pkmcal as pk
     >>> Remedy("effects", (pk.Sag("all"),)).applied({"effects": [pk.Coupling([(6, 5)]), pk.Sag()]})
-    {'effects': (Coupling(pairs=[(6, 5)], ratio=0.001), Sag('all'))}
+    {'effects': (Coupling(pairs=[(6, 5)], ratio=None), Sag('all'))}
     >>> Remedy("unknown", "target").applied({"unknown": {"frame": "known", "target": "known"}})
     {'unknown': {'frame': 'known', 'target': 'unknown'}}
     """
@@ -186,9 +186,13 @@ class Check(Generic[F]):
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
             raise ArgumentError(f"name of a check must be a word, found {shown(self.name)}")
+        instance(f"about of the check {self.name}", self.about, str)
+        for member in ("run", "say", "level_of", "remedies"):
+            if (given := getattr(self, member)) is not None or member in ("run", "say"):
+                function(f"{self.name}: {member}", given)
         for field in ("levels", "unless"):
-            if isinstance(several := getattr(self, field), str):
-                object.__setattr__(self, field, (several,))
+            several = words(f"{field} of the check {self.name}", getattr(self, field))
+            object.__setattr__(self, field, several)
 
 
 def at_most_one(finding: F | None) -> tuple[F, ...]:

@@ -9,7 +9,6 @@ from pkmcal.diagnostics.displaced import DisplacedTarget, displaced_target
 from pkmcal.diagnostics.drift import Drift, drift
 from pkmcal.diagnostics.late import late
 from pkmcal.diagnostics.measuring_order import MeasuringOrder, measuring_order
-from pkmcal.diagnostics.moved_instrument import moved_instrument
 from pkmcal.diagnostics.two_machines import Apart, apart
 from pkmcal.fitted.solution import Solution
 
@@ -35,7 +34,7 @@ CHECKS = (
     ),
     Check(
         name="measuring-order", about="residuals follow the order of measuring",
-        unless=("grave", "drift", "follows-loads"), levels=("doubt", "remark"),
+        unless=("grave", "drift", "follows-loads", "sag-lacking"), levels=("doubt", "remark"),
         run=lambda found: at_most_one(measuring_order(found.fit, found.outliers)), level_of=_level,
         say=lambda found, seen: str(seen),
     ),
@@ -46,16 +45,9 @@ CHECKS = (
         say=lambda found, seen: str(seen),
     ),
     Check(
-        name="moved-instrument", about="a camera, a board or another instrument was moved"
-        " between two poses",
-        levels=("doubt",), unless=("grave", "follows-loads"),
-        run=lambda found: at_most_one(moved_instrument(found.fit)),
-        level_of=lambda found, seen: "doubt" if seen.found else None,
-        say=lambda found, seen: str(seen),
-    ),
-    Check(
         name="two-machines", about="sets, sessions, halves or other rows fit better apart",
-        unless=("grave", "copies", "displaced-target", "follows-loads", "moved-instrument"),
+        unless=("grave", "copies", "displaced-target", "follows-loads", "moved-instrument",
+                "sag-lacking"),
         levels=("doubt", "remark"),
         run=lambda found: at_most_one(apart(found)),
         level_of=lambda found, seen: _level(found, seen) if seen.found else None,
@@ -64,7 +56,7 @@ CHECKS = (
     Check(
         name="displaced-target", about="a known target seems to be elsewhere than it is stated",
         unless=("grave",), levels=("doubt", "remark"),
-        run=lambda found: at_most_one(displaced_target(found.fit)), level_of=_level,
+        run=lambda found: at_most_one(displaced_target(found)), level_of=_level,
         say=lambda found, seen: str(seen),
         remedies=lambda found, seen: (Remedy("unknown", "target"),),
     ),

@@ -19,9 +19,11 @@ from pkmcal.display import chance_text, displayed, printable
 from pkmcal.estimation.fit_data import Dependence
 from pkmcal.estimation.uncertainty import Uncertainty
 from pkmcal.fitted.fit import Fit
+from pkmcal.fitted.solution import Solution
 from pkmcal.readings.predicted import Predicted
 from pkmcal.statistics.score_test import Columns, Score, score_test
 from pkmcal.statistics.shifts import TOLD_APART
+from pkmcal.statistics.weighed import Weighed
 
 _LARGE = 0.5  # of the squared residuals, from which they are little else
 
@@ -72,18 +74,21 @@ class DisplacedTarget:
         )
 
 
-def displaced_target(fit: Fit) -> DisplacedTarget | None:
+def displaced_target(found: Solution) -> DisplacedTarget | None:
     """Test each known target of several.
 
     None where fewer are known, rows are mixtures, or residuals rounding errors.
     """
-    sure = fit.uncertainty
+    fit, sure = found.fit, found.fit.uncertainty
     if sure.mixed or sure.rounded:
         return None
-    targets = dict(_targets(fit))
+    targets, weighed = dict(_targets(fit)), found.weighed
     if len(targets) < 2:
         return None
-    tested = {name: score_test(sure.tested, _columns(fit, rows)) for name, rows in targets.items()}
+    tested = {
+        name: score_test(weighed.fit, weighed.columns(_columns(fit, rows)))
+        for name, rows in targets.items()
+    }
     known = {name: score for name, score in tested.items() if score is not None}
     if not known:
         return None
@@ -94,16 +99,16 @@ def displaced_target(fit: Fit) -> DisplacedTarget | None:
         shift=tuple(best.size.tolist()),
         stderr=tuple(best.deviation.tolist()),
         chance=min(1.0, len(known) * best.chance),
-        share=_share(sure, best.explained),
-        also=tuple(_alike(known, name, (sure.tested.squares - best.drop) / sure.tested.freedom)),
+        share=_share(sure, weighed, best.explained),
+        also=tuple(_alike(known, name, (weighed.fit.squares - best.drop) / weighed.fit.freedom)),
     )
 
 
-def _share(sure: Uncertainty, explained: FloatArray) -> float:
+def _share(sure: Uncertainty, weighed: Weighed, explained: FloatArray) -> float:
     """Share of the squared lengths that is explained."""
-    lengths = sure.labels.length
-    before = sure.in_units(sure.tested.residual)[lengths]
-    after = before - sure.in_units(explained)[lengths]
+    lengths = sure.blocks.length
+    before = sure.in_units(weighed.unweigh(weighed.fit.residual))[lengths]
+    after = before - sure.in_units(weighed.unweigh(explained))[lengths]
     return 1.0 - float(after @ after) / float(before @ before)
 
 

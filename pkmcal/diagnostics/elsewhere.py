@@ -16,6 +16,7 @@ from pkmcal.diagnostics.check import Check, Level, Remedy
 from pkmcal.diagnostics.robust_check import CARRIED
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.estimator import Estimator
+from pkmcal.estimation.solving import solve
 from pkmcal.fitted.dropped import elsewhere, without
 from pkmcal.fitted.fit import Fit
 from pkmcal.fitted.row_names import row_names
@@ -61,8 +62,8 @@ def _ratio(fit: Fit, rows: Sequence[int]) -> float:
     try:
         others = Equations.of(without(fit.equations.prediction.datasets, rows), fit.parameters)
         others = others.reweighted(fit.uncertainty.equations.whitening.deviations)
-        start = others.with_exact_actuators().at(fit.problem.start.theta)
-        estimate = Estimator(*others.begin(start), "linear").solve()
+        start = others.with_exact_actuators().at(fit.aligned.theta)
+        estimate = solve(Estimator.of(*others.begin(start)))
     except ValueError:
         return float("nan")
     return float(fit.estimate.state.noise[-1] / estimate.state.noise[-1])

@@ -17,8 +17,9 @@ import numpy as np
 from pkmcal.arrays import FloatArray
 from pkmcal.diagnostics.check import Check
 from pkmcal.display import displayed
+from pkmcal.estimation.machine_size import machine_size, stated_size
 from pkmcal.fitted.solution import Solution
-from pkmcal.readings.reading import Family
+from pkmcal.readings.components import Family
 from pkmcal.statistics.distributions import f_tail
 from pkmcal.statistics.singular_values import svd
 
@@ -56,12 +57,12 @@ class UnlikeFamily:
 def unlike_families(found: Solution) -> Iterator[UnlikeFamily]:
     """Families of sets without a stated sigma that do not fit where another does."""
     start, end, equations = found.fit.start, found.fit.end, found.fit.equations
-    size = found.fit.parameters.robot.length
+    size, stated = machine_size(equations, end.theta), stated_size(equations)
     for i, m in enumerate(equations.table.sets):
         families = m.instrument.families
         if m.sigma is not None or len(families) < 2:
             continue
-        arcs = equations.arcs[i]
+        arcs = m.instrument.arcs(m, size)
         after = [_median((end.residuals[i] * arcs)[:, list(each.columns)]) for each in families]
         for number, family in enumerate(families):
             columns = list(family.columns)
@@ -71,7 +72,8 @@ def unlike_families(found: Solution) -> Iterator[UnlikeFamily]:
                 continue
             residual = end.residuals[i][:, columns]
             predicted = equations.prediction.values(end)[i][:, columns]
-            gross = off > GROSS * size and off > _KEPT * before
+            largest = stated if family.unit == "mm" else size  # lengths of no size are not gross
+            gross = off > GROSS * largest and off > _KEPT * before
             if gross or _follows(residual, predicted) < _CHANCE:
                 arc = float(arcs[columns[0]])
                 yield UnlikeFamily(i, family, before / arc, off / arc, off / max(other, 1e-300))
@@ -88,9 +90,10 @@ class Constant(NamedTuple):
 def constant_components(found: Solution) -> Iterator[Constant]:
     """Components that are equal to the last digit where the machine says they vary."""
     end, equations = found.fit.end, found.fit.equations
-    size = found.fit.parameters.robot.length
+    size = machine_size(equations, end.theta)
     for i, m in enumerate(equations.table.sets):
         values = m.values.reshape(len(m), -1)
+        arcs = m.instrument.arcs(m, size)
         names = m.components if len(m.instrument.families) > 1 else ()
         for k, name in enumerate(names):
             seen = equations.prediction.values(end)[i][:, k]
@@ -98,7 +101,7 @@ def constant_components(found: Solution) -> Iterator[Constant]:
             read, predicted = values[rows, k], seen[rows]
             if len(read) < _LEAST_ROWS or (read != read[0]).any():
                 continue
-            if float(np.ptp(predicted)) * equations.arcs[i][k] > _VARIES * size:
+            if float(np.ptp(predicted)) * arcs[k] > _VARIES * size:
                 yield Constant(name, m.units[k], float(read[0]))
 
 

@@ -7,8 +7,10 @@ import numpy as np
 from pkmcal.arrays import FloatArray
 from pkmcal.diagnostics.check import Check, Level, Remedy, at_most_one
 from pkmcal.diagnostics.moved import Moved, moved
+from pkmcal.diagnostics.row_errors import likely_row_errors
+from pkmcal.diagnostics.units import likely_unit_errors
 from pkmcal.display import chance_text, decimals, displayed, fixed
-from pkmcal.estimation.estimator import FEW, LEAST_FREEDOM
+from pkmcal.estimation.solving import FEW, LEAST_FREEDOM
 from pkmcal.fitted.held_points import HeldFamily
 from pkmcal.fitted.row_names import row_names
 from pkmcal.fitted.solution import Solution
@@ -19,7 +21,17 @@ def _contradiction(found: Solution, several: tuple[HeldFamily, ...]) -> str:
     alone = len(found.holdout_families) == 1
     what = "points" if alone else " and ".join(each.family.noun for each in several)
     chance = min(each.test.chance for each in several if each.test is not None)
-    return f"the held-out {what} contradict the fit: {_compared(several)} ({chance_text(chance)})"
+    text = f"the held-out {what} contradict the fit: {_compared(several)} ({chance_text(chance)})"
+    return "; ".join([text, *_meant(found)])
+
+
+def _meant(found: Solution) -> list[str]:
+    """Name readings with which other measurements that were held out agree: signs, orders, rows."""
+    later, end = found.holdout_later, found.holdout_end
+    if found.holdout_drawn or later is None or end is None:
+        return []
+    named = likely_unit_errors(later.data, later.parameters, end, near=end.theta, least=0.0)
+    return named or likely_row_errors(later.data, later.parameters, near=end.theta)
 
 
 def _compared(several: tuple[HeldFamily, ...]) -> str:

@@ -7,19 +7,17 @@ is far below a row: trials of whole rows that are late do not.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-import numpy as np
-
-from pkmcal.arrays import FloatArray, IntArray
-from pkmcal.diagnostics.check import RARE
-from pkmcal.diagnostics.columns import of_rows
+from pkmcal.diagnostics.cause_columns import LAG, of_lag, possible
+from pkmcal.diagnostics.check import CHANCE, RARE
 from pkmcal.diagnostics.visits import visits_of
 from pkmcal.display import chance_text
 from pkmcal.fitted.solution import Solution
-from pkmcal.readings.predicted import Predicted
-from pkmcal.statistics.score_test import Columns, beside
+from pkmcal.statistics.causes import taken_along
+from pkmcal.statistics.score_test import Beside, Score, beside
 
+_NAMED = 2  # causes of another kind
 _MOST = 2.0  # ways: rows that are late by more are tried as whole rows
 
 
@@ -38,38 +36,54 @@ class Late:
         How likely a share as large, of either way, would be if they were not.
     leaving : bool
         Whether it is of the way to the next pose.
+    instead : tuple of str
+        Causes of another kind beside which no lag is seen.
+    rather : bool
+        Whether one of them explains what no lag does.
     """
 
     share: float
     stderr: float
     chance: float
     leaving: bool
+    instead: tuple[str, ...] = ()
+    rather: bool = False
 
     @property
     def found(self) -> bool:
-        """True if readings and actuators are of different moments."""
+        """True if residuals follow the way to or from a pose."""
         return self.chance < RARE
 
     def __str__(self) -> str:
         odds = chance_text(self.chance)
+        way = "to the next pose" if self.leaving else "from the pose before"
+        if not self.instead:
+            return self._lag(way, f" ({odds})")
+        follow = f"residuals follow the way {way} ({odds})"
+        others = " or ".join(self.instead)
+        if self.rather:
+            return f"{follow}, and no lag explains them all: they look like {others}"
+        return f"{follow}: they look like {others}, or {self._lag(way)}"
+
+    def _lag(self, way: str, odds: str = "") -> str:
+        """Readings that are late by this share, and what helps."""
+        late, far = self.share > 0.0, f"{100 * abs(self.share):.2g} % of the way {way}"
         if self.leaving:
-            way = f"{100 * abs(self.share):.2g} % of the way to the next pose"
             return (
-                f"{'readings' if self.share > 0.0 else 'actuators'} are as if"
-                f" {'taken' if self.share > 0.0 else 'logged'} after the machine had gone {way}"
-                f" ({odds}): log both at one moment, when the machine stands; or the rows stand in"
-                " the reversed order of measuring, and readings are late"
+                f"{'readings' if late else 'actuators'} are as if"
+                f" {'taken' if late else 'logged'} after the machine had gone {far}{odds}: log both"
+                " at one moment, when the machine stands; or the rows stand in the reversed order"
+                " of measuring, and readings are late"
             )
-        short = f"{100 * abs(self.share):.2g} % of the way from the pose before"
-        if self.share > 0.0:
+        if late:
             return (
-                f"readings are as if taken {short}, before the machine arrived ({odds}): let it"
-                " settle for longer before each reading, and see that actuators and instrument are"
-                " logged at one moment"
+                f"readings are as if taken {far}, before the machine arrived{odds}: let it settle"
+                " for longer before each reading, and see that actuators and instrument are logged"
+                " at one moment"
             )
         return (
-            f"actuators are as if logged {short}, before the machine arrived where the instrument"
-            f" read it ({odds}): log both at one moment, when the machine stands"
+            f"actuators are as if logged {far}, before the machine arrived where the instrument"
+            f" read it{odds}: log both at one moment, when the machine stands"
         )
 
 
@@ -78,9 +92,9 @@ def late(found: Solution) -> Late | None:
     sure = found.fit.uncertainty
     if sure.rounded or not sure.equations.whitening.any_read:
         return None
-    visits = visits_of(found)
+    visits, weighed = visits_of(found), found.weighed
     tested = {
-        leaving: beside(sure.tested, _columns(found, visits.actuators, place))
+        leaving: beside(weighed.fit, weighed.columns(of_lag(found.fit, visits.actuators, place)))
         for leaving, place in ((False, visits.before), (True, visits.after))
     }
     ways = {leaving: each for leaving, each in tested.items() if each is not None}
@@ -98,21 +112,38 @@ def late(found: Solution) -> Late | None:
     leaving = min(known, key=lambda each: (known[each].chance, -known[each].drop))
     score = known[leaving]
     chance = min(1.0, len(ways) * score.chance)
-    return Late(float(score.size[0]), float(score.deviation[0]), chance, leaving)
+    seen = Late(float(score.size[0]), float(score.deviation[0]), chance, leaving)
+    return _beside_other_causes(found, seen, ways[leaving], score) if seen.found else seen
 
 
-def _columns(found: Solution, actuators: FloatArray, place: IntArray) -> Columns:
-    """Differentiate equations by the share of the way to other places that readings are off.
+def _beside_other_causes(found: Solution, seen: Late, lag: Beside, score: Score) -> Late:
+    """Say which causes of another kind show as that lag does.
 
-    The places are actuator readings, rows `place` (N,) of `actuators` (K, n).
+    Play follows the signs of the ways of the actuators; where poses were drawn at random a drive
+    whose error follows its reading seems to follow the way from the last one, too. Beside the true
+    cause there is no lag, and beside a lag the cause still explains something.
     """
-    fit = found.fit
-    table, end = fit.equations.table, fit.estimate.evaluation
-    first = np.cumsum([0, *map(len, table.sets)])
+    weighed, instead = found.weighed, list[tuple[float, str, bool]]()
+    for cause, columns in possible(found):
+        own = None if cause.name == LAG else beside(weighed.fit, weighed.columns(columns))
+        known = None if own is None or own.chance >= CHANCE else own.score()
+        if own is None or known is None or known.chance >= CHANCE:
+            continue
+        if _chance_after(own, known, lag) < RARE:
+            continue
+        rather = _chance_after(lag, score, own) < CHANCE
+        instead.append((known.chance, f"{cause.name} ({cause.cure})", rather))
+    instead.sort()
+    better = [each for each in instead if each[2]]
+    return replace(
+        seen,
+        instead=tuple(name for _, name, _ in (better or instead)[:_NAMED]),
+        rather=bool(better),
+    )
 
-    def change(i: int, rows: slice, seen: Predicted) -> FloatArray:
-        way = actuators[place[first[i] : first[i + 1]][rows]] - table.sets[i].actuators[rows]
-        twists = end.machines.actuator_twists(end.states, table.pose_of[i][rows])
-        return seen.by_twist @ (twists @ way[:, :, None])
 
-    return of_rows(fit, change)
+def _chance_after(taken: Beside, score: Score, other: Beside) -> float:
+    """Chance of the other columns beside what these explain; 1 where nothing is left of them."""
+    after = beside(taken_along(taken, score), other.columns)
+    found = None if after is None else after.score()
+    return 1.0 if found is None else found.chance

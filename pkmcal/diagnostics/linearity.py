@@ -13,7 +13,9 @@ import numpy as np
 
 from pkmcal.estimation.estimate import Estimate
 from pkmcal.estimation.identifiability import CLEAR, listed
+from pkmcal.estimation.machine_size import machine_size
 from pkmcal.estimation.uncertainty import Uncertainty
+from pkmcal.exceptions import ArgumentError
 
 _DRAWS = 8
 _BY_PRIOR = 0.5  # share of what is known of a combination from which a prior determines it
@@ -59,7 +61,7 @@ def beyond_linear(estimate: Estimate, uncertainty: Uncertainty) -> Weak | None:
     values, vectors = np.linalg.eigh(uncertainty.covariance.of(measured.T))
     root = vectors * np.sqrt(np.maximum(values, 0.0)) @ vectors.T
     root = fitted @ (fitted.T @ linear_fit.back @ measured @ root)
-    least = CLEAR * chosen.robot.length
+    least = CLEAR * machine_size(equations, estimate.evaluation.theta)
     if not np.linalg.norm(root, 2) > least:
         return None
     weights = np.repeat(estimate.weights, equations.blocks.components)
@@ -67,13 +69,17 @@ def beyond_linear(estimate: Estimate, uncertainty: Uncertainty) -> Weak | None:
     for draw in np.random.default_rng(0).normal(size=(_DRAWS, root.shape[1])):
         step = root @ draw
         here = estimate.evaluation
-        there = equations.at(here.theta + chosen.scale * step, state.noise, here)
+        try:
+            there = equations.at(here.theta + chosen.scale * step, state.noise, here)
+        except ArgumentError:  # so far that no machine has these numbers
+            rises.append(np.inf)
+            continue
         residual = equations.residual(there, state.noise)
         change = estimate.change(step)
         linear = estimate.residual - change
         beyond = weights @ residual**2 - weights @ linear**2
-        rises.append(beyond / (weights @ change**2))
-    off = np.nan_to_num(np.abs(rises), nan=np.inf)
+        rises.append(float(beyond / (weights @ change**2)))
+    off = np.nan_to_num(np.abs(rises), nan=np.inf, posinf=np.inf)
     if np.median(off) < _OFF:
         return None
     names = [chosen.names[i] for i in np.flatnonzero(np.linalg.norm(root, axis=1) > least)]

@@ -8,16 +8,19 @@ from typing import NamedTuple
 import numpy as np
 
 from pkmcal.arguments import instance
-from pkmcal.arrays import BoolArray, FloatArray, rms
+from pkmcal.arrays import BoolArray, FloatArray, IntArray, rms
 from pkmcal.diagnostics.check import Check, Remedy, at_most_one
-from pkmcal.display import first_rows, printable
+from pkmcal.display import displayed, first_rows, printable
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.identifiability import listed
+from pkmcal.estimation.machine_size import sizes
 from pkmcal.estimation.mode_slips import in_other_modes
 from pkmcal.fitted.solution import Solution
 from pkmcal.geometry.elastic import is_kinematic
-from pkmcal.kinematics.calibratable import as_parallel
+from pkmcal.kinematics.calibratable import Calibratable, as_arm, as_parallel
 from pkmcal.kinematics.robot import Robot
+from pkmcal.readings.unknowns import PLAIN
+from pkmcal.statistics.distributions import t_factor
 
 FAR = 0.25  # share of the machine's size by which errors of manufacture do not move a parameter
 _BEYOND = 0.01  # share of a stroke by which errors of a machine may carry it beyond its ends
@@ -34,8 +37,57 @@ def far_numbers(found: Solution) -> dict[str, float]:
     change = found.fit.estimate.evaluation.theta - found.fit.start.theta
     moved = np.abs(change / chosen.scale)[chosen.geometry]
     moved[[not is_kinematic(name) for name in chosen.names[chosen.geometry]]] = 0.0
-    far = np.flatnonzero(moved > FAR * chosen.robot.length)
+    far = np.flatnonzero(moved > FAR * sizes(found.fit.equations)[chosen.geometry])
     return {chosen.names[i]: float(moved[i]) for i in far}
+
+
+def _surely_far(found: Solution) -> dict[str, float]:
+    """Return `far_numbers` that are far wherever within their ± they are.
+
+    What readings hardly tell may end far away without a fault, and its ± says so.
+    """
+    far = far_numbers(found)
+    if not far:
+        return far
+    names, scale = found.fit.parameters.names, found.fit.parameters.scale
+    half = np.ptp(found.interval95, axis=1) / 2.0
+    if np.isinf(half).any():
+        half = np.where(np.isfinite(half), half, _of_what_is_told(found))
+    own = dict(zip(found.free, half.tolist(), strict=True))
+    reach = FAR * sizes(found.fit.equations)
+    return {
+        name: moved
+        for name, moved in far.items()
+        if not np.isfinite(own.get(name, 0.0))
+        or moved - own.get(name, 0.0) / scale[names.index(name)] > reach[names.index(name)]
+    }
+
+
+def _of_what_is_told(found: Solution) -> FloatArray:
+    """Half widths (n,) of intervals of what was determined of each number.
+
+    Of one that is determined together with others alone a part moved; the other is as it was.
+    """
+    sure = found.fit.uncertainty
+    told = np.sqrt(np.maximum(np.diagonal(sure.matrix), 0.0))
+    factor = t_factor(sure.freedom)
+    shown = np.isfinite(factor)
+    half = np.full(len(told), np.inf)
+    half[shown] = factor[shown] * told[shown]
+    return half[found.columns]
+
+
+def _far_text(found: Solution, moved: dict[str, float]) -> str:
+    """Say how far numbers moved: in their unit, or in mm at the machine where they have several."""
+    chosen, most = found.fit.parameters, max(moved, key=lambda name: moved[name])
+    units = {chosen.units[chosen.names.index(name)] for name in moved}
+    value, unit = moved[most], "mm"
+    if units == {"rad"}:
+        value, unit = displayed(value * chosen.scale[chosen.names.index(most)], "rad")
+    return (
+        f"{listed(list(moved))} moved by up to {value:.3g} {unit}, further than errors of a"
+        " machine: check that the robot file describes this one, or free fewer parameters"
+    )
 
 
 class DistantPoint(NamedTuple):
@@ -59,11 +111,15 @@ def _distant_points(found: Solution) -> Iterator[DistantPoint]:
     """Points that were looked for near the platform and found far away.
 
     Poses that hardly turn do not determine where a target is; noise may then carry it anywhere.
+    On an arm without lengths a target may be anywhere.
     """
+    arm = as_arm(found.fit.parameters.robot)
+    if arm is not None and arm.without_lengths:
+        return
     parameters, theta = found.fit.parameters, found.fit.end.theta
     size = _platform_size(found)
     for (role, point), number in parameters.nuisance.items():
-        if role not in ("target", "attachment"):
+        if parameters.natures.get((role, point), PLAIN).point_of != "platform":
             continue
         for first in np.flatnonzero(parameters.number_of == number).tolist():
             place = theta[first : first + 3]
@@ -119,7 +175,7 @@ def _out_of_stroke(found: Solution) -> tuple[OutOfStroke, ...]:
     """
     start, end, equations = found.fit.start, found.fit.end, found.fit.equations
     robot = as_parallel(start.robot)
-    if robot is None:
+    if robot is None or all(limb.stroke is None for limb in robot.model.limbs):
         return ()  # the file of an arm states no strokes
     out = _beyond(robot, _drives(end))
     if not out.any():
@@ -153,16 +209,24 @@ def _out_of_stroke_text(found: Solution, seen: OutOfStroke) -> str:
 
 
 def _drives(evaluation: Evaluation) -> FloatArray:
-    """Drive coordinates (K, limbs) at the poses, each of its session's machine."""
-    return evaluation.machines.joined(
-        lambda robot, own: instance("robot", robot, Robot).feasible(evaluation.pose[own]).drive
-    )
+    """The way of the first drive of each limb at the poses, (K, limbs), 0 of none.
+
+    Each of its session's machine.
+    """
+
+    def ways(machine: Calibratable, own: IntArray) -> FloatArray:
+        robot = instance("robot", machine, Robot)
+        inward = robot.frames.inward(evaluation.pose[own])
+        first = np.array(robot.model.mechanism.first_drives)
+        every = robot.machine.drives_at(robot.slots, inward)
+        return np.where(first >= 0, every[:, np.maximum(first, 0)], 0.0)
+
+    return evaluation.machines.joined(ways)
 
 
 def _beyond(robot: Robot, drive: FloatArray) -> BoolArray:
     """Mark the drives (K, limbs) that are beyond their strokes by more than errors explain."""
     strokes = [limb.stroke or (-np.inf, np.inf) for limb in robot.model.limbs]
-    drive = drive[:, : len(strokes)]  # without the tail
     low, high = np.array(strokes).T
     room = np.where(np.isfinite(low), _BEYOND * (high - low), 0.0)
     out: BoolArray = (drive < low - room) | (drive > high + room)
@@ -173,12 +237,8 @@ CHECKS = (
     Check(
         name="implausible-changes",
         about="numbers moved further than errors of manufacture explain", unless=("unit-errors",),
-        at_once=True, run=lambda found: at_most_one(far_numbers(found) or None),
-        say=lambda found, moved: (
-            f"{listed(list(moved))} moved by up to {max(moved.values()):.3g} mm, further than"
-            " errors of a machine: check that the robot file describes this one, or free fewer"
-            " parameters"
-        ),
+        at_once=True, run=lambda found: at_most_one(_surely_far(found) or None),
+        say=_far_text,
         remedies=lambda found, moved: (Remedy("fix", tuple(moved)),),
     ),
     Check(

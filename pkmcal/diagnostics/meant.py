@@ -58,8 +58,8 @@ class Meant:
 
 
 def joined_later(measured: Measurements, rows: int) -> Options | None:
-    """Take the row of the log that stands `rows` after; None where no log was joined."""
-    if all(each.file == own.file for own in _columns(measured) for each in _columns(measured)):
+    """Take the actuators that stand `rows` after; None where nothing was read from a file."""
+    if not _columns(measured):
         return None
     return (("--join", f"row{rows:+d}"),)
 

@@ -175,29 +175,32 @@ def _visits(fit: Fit, odd: Collection[int]) -> _Visits:
     use = ~np.isin(equations.table.rows, list(odd))
     order = np.lexsort((equations.table.rows, time, series))
     order = order[use[order]]
-    pose = sure.poses
+    pose = sure.blocks.pose_of_row
     new = (np.diff(pose[order], prepend=-1) != 0) | (np.diff(series[order], prepend=-1) != 0)
     visit = np.full(len(time), -1)
     visit[order] = np.cumsum(new) - 1
     first = order[new]
-    labels = sure.labels
-    mine = visit[labels.row] >= 0
-    key = numbered(visit[labels.row][mine], labels.component[mine])
-    _, where = np.unique(key, return_index=True)
+    blocks = sure.blocks
+    mine = visit[blocks.row] >= 0
+    of_equation = visit[blocks.row][mine]
+    key = numbered(of_equation, blocks.component[mine])
     alone = np.array_equal(key, np.arange(len(mine)))  # there is nothing to average
+    if not alone:
+        of_equation = of_equation[np.unique(key, return_index=True)[1]]
 
     def averaged(part: FloatArray) -> FloatArray:
         return part if alone else means(part[mine], key)
 
+    weighed = sure.weighed
     return _Visits(
         names=names,
         series=series[first],
         row=equations.table.rows[first],
         place=first,
-        visit=visit[labels.row][mine][where],
-        design=averaged(sure.tested.design),
-        residual=averaged(sure.tested.residual[:, None])[:, 0],
-        by_component=averaged(_by_component(fit)),
+        visit=of_equation,
+        design=averaged(weighed.fit.design),
+        residual=averaged(weighed.fit.residual[:, None])[:, 0],
+        by_component=averaged(weighed.weigh(_by_component(fit))),
     )
 
 
@@ -241,11 +244,11 @@ def _tested(visits: _Visits, series: int) -> tuple[int, int, Course] | None:
     own = np.flatnonzero(visits.series == series)
     if len(own) < _FEWEST:
         return None
-    within = (visits.visit >= own[0]) & (visits.visit <= own[-1])
-    tested = Series(
-        visits.design, visits.residual, visits.by_component,
-        np.where(within, visits.visit - own[0], -1),
-    )  # fmt: skip
+    visit = visits.visit
+    if len(own) < len(visits.series):
+        within = (visit >= own[0]) & (visit <= own[-1])
+        visit = np.where(within, visit - own[0], -1)
+    tested = Series(visits.design, visits.residual, visits.by_component, visit)
     course = tested.course()
     if course is None:
         return None

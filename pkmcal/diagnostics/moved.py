@@ -12,7 +12,6 @@ from pkmcal.arrays import FloatArray
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.identifiability import listed
-from pkmcal.estimation.labels import labels
 from pkmcal.estimation.mode_slips import in_their_modes
 from pkmcal.fitted.fit import Fit
 from pkmcal.fitted.later import Later, noise_factors
@@ -92,7 +91,7 @@ def moved(fit: Fit, later: Later, end: Evaluation) -> tuple[Moved, ...]:
     # the second session's own numbers follow those of the fit
     jacobian = np.hstack([later.by_fitted(whole, len(chosen)), whole[:, later.own]])
     residual = second.residual(evaluation, noise)[use]
-    cluster = labels(second).pose[use]
+    cluster = second.blocks.pose[use]
     n, own = len(chosen), int(later.own.sum())
     rates = chosen.reported_rates(fit.end.theta) * chosen.scale
     by_reported = np.vstack([np.linalg.inv(rates), np.zeros((own, n))])

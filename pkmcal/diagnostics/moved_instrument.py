@@ -13,15 +13,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
-from pkmcal.diagnostics.check import RARE
+from pkmcal.diagnostics.check import RARE, Check, at_most_one
 from pkmcal.diagnostics.columns import of_rows
 from pkmcal.diagnostics.two_machines import row_of_equation
 from pkmcal.display import chance_text, displayed
 from pkmcal.fitted.fit import Fit
 from pkmcal.fitted.row_names import row_names
+from pkmcal.fitted.solution import Solution
 from pkmcal.readings.predicted import Predicted
 from pkmcal.statistics.linear_fit import numbered
 from pkmcal.statistics.score_test import jump
+from pkmcal.statistics.weighed import Weighed
 
 _FEWEST = 3  # poses before and after
 _FEW = 10.0  # degrees of freedom below which nothing is told apart
@@ -73,18 +75,18 @@ class MovedInstrument:
         )
 
 
-def moved_instrument(fit: Fit) -> MovedInstrument | None:
+def moved_instrument(found: Solution) -> MovedInstrument | None:
     """Test everything that has a place of its own; None where poses have no unknowns, or too few.
 
     Where poses follow from the actuators residuals show it by their order: `measuring_order`.
     """
-    sure = fit.uncertainty
+    fit, sure = found.fit, found.fit.uncertainty
     if not sure.mixed or sure.rounded or sure.tested.freedom < _FEW:
         return None
     tried = []
     visit, first = _visits(fit)
     for thing, numbers, of_frame, rows in _things(fit):
-        tested = _tested(fit, of_frame, rows, visit)
+        tested = _tested(fit, found.weighed, of_frame, rows, visit)
         if tested is not None:
             tried.append((tested[0], thing, numbers, first[tested[1]], tested[2], tested[3]))
     if not tried:
@@ -113,7 +115,7 @@ def _visits(fit: Fit) -> tuple[IntArray, IntArray]:
 def _things(fit: Fit) -> Iterator[tuple[str, str, bool, Rows]]:
     """Things whose place is found: in words, their numbers, whether a frame, and their rows."""
     prediction = fit.uncertainty.equations.prediction
-    for of_frame, several in ((True, prediction.frames), (False, prediction.tools)):
+    for of_frame, several in ((True, prediction.frames), (False, prediction.carried_things)):
         for first, rows in several.items():
             stem = prediction.parameters.names[first].rsplit(".", 1)[0]
             (one, *_) = (prediction.table.sets[i].instrument for i in rows)
@@ -131,14 +133,14 @@ def _things(fit: Fit) -> Iterator[tuple[str, str, bool, Rows]]:
 
 
 def _tested(
-    fit: Fit, of_frame: bool, rows: Rows, visit: IntArray
+    fit: Fit, weighed: Weighed, of_frame: bool, rows: Rows, visit: IntArray
 ) -> tuple[float, int, float, str] | None:
     """Chance of a jump of a place, the visit from which on, its size and the unit of that."""
     sure = fit.uncertainty
     equations = sure.equations
 
     def change(i: int, some: slice, seen: Predicted) -> FloatArray:
-        by = seen.by_frame if of_frame else seen.by.get("tool")
+        by = seen.by_frame if of_frame else seen.by.get(equations.prediction.carried[i])
         found = np.zeros((*seen.values.shape, 6))
         if i in rows and by is not None:
             mine = np.zeros(len(equations.table.sets[i]), dtype=bool)
@@ -146,8 +148,8 @@ def _tested(
             found[mine[some]] = by[mine[some]]
         return found
 
-    columns = np.empty((len(sure.tested.residual), 6))
-    for part, made in of_rows(fit, change)():
+    columns = np.empty((len(weighed.fit.residual), 6))
+    for part, made in weighed.columns(of_rows(fit, change))():
         columns[part] = made
     own = np.concatenate([
         np.isin(np.arange(len(m)), rows.get(i, [])) for i, m in enumerate(equations.table.sets)
@@ -155,7 +157,7 @@ def _tested(
     named = np.unique(visit[own])
     at = np.searchsorted(named, visit[row_of_equation(sure)])
     among = np.minimum(at, len(named) - 1)
-    found = jump(sure.tested, columns, among, _FEWEST)
+    found = jump(weighed.fit, columns, among, _FEWEST)
     if found is None:
         return None
     since, size, unit = int(named[found.at]), np.empty(0), ""
@@ -169,3 +171,15 @@ def _tested(
             off = change(i, some, seen)[mine[some]] @ found.size
             size, unit = np.append(size, (off**2).sum(axis=1)), measured.units[0]
     return found.chance, since, float(np.sqrt(np.mean(size))) if len(size) else 0.0, unit
+
+
+CHECKS = (
+    Check(
+        name="moved-instrument", about="a camera, a board or another instrument was moved"
+        " between two poses",
+        levels=("doubt",), unless=("grave", "follows-loads"),
+        run=lambda found: at_most_one(moved_instrument(found)),
+        level_of=lambda found, seen: "doubt" if seen.found else None,
+        say=lambda found, seen: str(seen),
+    ),
+)  # fmt: skip

@@ -14,7 +14,7 @@ import numpy as np
 from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.diagnostics.check import Check, at_most_one
 from pkmcal.display import chance_text, first_rows
-from pkmcal.estimation.labels import Labels
+from pkmcal.estimation.row_blocks import RowBlocks
 from pkmcal.fitted.solution import Solution
 from pkmcal.measurements import repeats
 from pkmcal.statistics.distributions import f_tail
@@ -61,9 +61,9 @@ def near_copies(found: Solution) -> NearCopies | None:
     alone = 2.0 * float(np.square(sure.fit.residual).sum()) / sure.fit.freedom
     seen = []
     for errors in (sure.fit.residual, sure.equations.whitening.whitened(values, sure.factors)):
-        for family in np.unique(sure.labels.family):
-            mine = sure.labels.family == family
-            one, other = (_by_row(sure.labels, mine, errors, rows) for rows in (first, later))
+        for family in np.unique(sure.blocks.family):
+            mine = sure.blocks.family == family
+            one, other = (_by_row(sure.blocks, mine, errors, rows) for rows in (first, later))
             apart = (other - one)[np.isfinite(other - one).any(axis=1)]
             if len(apart) < _LEAST or len(np.unique(one, axis=0)) < _DISTINCT * len(one):
                 continue
@@ -80,11 +80,11 @@ def near_copies(found: Solution) -> NearCopies | None:
     )
 
 
-def _by_row(labels: Labels, mine: BoolArray, errors: FloatArray, rows: IntArray) -> FloatArray:
+def _by_row(blocks: RowBlocks, mine: BoolArray, errors: FloatArray, rows: IntArray) -> FloatArray:
     """Errors of some equations (M,) by rows (n,) and component, NaN where there are none."""
-    column = numbered(labels.component)
-    table = np.full((int(max(labels.row.max(), rows.max())) + 1, int(column.max()) + 1), np.nan)
-    table[labels.row[mine], column[mine]] = errors[mine]
+    column = numbered(blocks.component)
+    table = np.full((int(max(blocks.row.max(), rows.max())) + 1, int(column.max()) + 1), np.nan)
+    table[blocks.row[mine], column[mine]] = errors[mine]
     return table[rows]
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from pkmcal.diagnostics.check import Check, Remedy, at_most_one
-from pkmcal.estimation.estimator import FEW, LEAST_FREEDOM
 from pkmcal.estimation.set_noise import apart
+from pkmcal.estimation.solving import FEW, LEAST_FREEDOM
 from pkmcal.fitted.solution import Solution
 from pkmcal.readings.reading import Reading
 from pkmcal.statistics.covariance import spare
@@ -21,7 +21,7 @@ _CAUCHY = Remedy("loss", "cauchy")
 def _few_spare(found: Solution) -> tuple[float, ...]:
     """Spare equations where they are few, and the noise has to be estimated from them."""
     sure = found.fit.uncertainty
-    if sure.fit.freedom >= FEW or not sure.equations.blocks.unstated.any():
+    if sure.fit.freedom >= FEW or not sure.blocks.unstated.any():
         return ()
     # of mixtures `noise-unknown` names the groups, and `too-few-rows` says that nothing is left
     said_elsewhere = not sure.known and (sure.mixed or found.dof < LEAST_FREEDOM)

@@ -13,7 +13,7 @@ from pkmcal.diagnostics.meant import Meant, Options, in_unit, renamed
 from pkmcal.measurements.inverted import inverted
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.table_layout import ORDERS, OWN_ORDER
-from pkmcal.readings.reading import Family
+from pkmcal.readings.components import Family
 
 _OWN = ("XYZ", "XZY", "YXZ", "YZX", "ZXY")  # other orders of an angle about x, y and z each
 _REVERSED = "counts the other way"

@@ -8,6 +8,7 @@ machine to nothing, and the residuals with it.
 from __future__ import annotations
 
 from pkmcal.arrays import FloatArray
+from pkmcal.estimation.machine_size import sizes
 from pkmcal.estimation.uncertainty import Uncertainty
 from pkmcal.statistics.linear_fit import LinearFit
 
@@ -15,5 +16,8 @@ _MOST = 0.5  # of the machine's size
 
 
 def reach(sure: Uncertainty, fit: LinearFit) -> FloatArray:
-    """Return numbers (n, p) by parameters of a linear fit, in units of how far they can be off."""
-    return fit.back / (_MOST * sure.equations.parameters.robot.length)
+    """Return numbers (n, p) by parameters of a linear fit, in units of how far they can be off.
+
+    Lengths of an arm without any may be anything: no size bounds them.
+    """
+    return fit.back / (_MOST * sizes(sure.equations))[:, None]

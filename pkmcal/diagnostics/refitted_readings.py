@@ -81,18 +81,18 @@ class _Compared:
     @classmethod
     def of(cls, found: Solution) -> _Compared:
         sure = found.fit.uncertainty
-        odd = np.isin(sure.equations.table.rows, found.outliers)[sure.labels.row]
+        odd = np.isin(sure.equations.table.rows, found.outliers)[sure.blocks.row]
         use = sure.fit.without_idle(np.flatnonzero(~odd))
         use = use[:: max(1, -(-len(use) // _MOST))]
-        group = numbered(sure.labels.set_of[use], sure.labels.family[use])
+        group = numbered(sure.blocks.set_of[use], sure.blocks.family[use])
         table, end, white = sure.equations.table, found.fit.end, sure.equations.whitening
         needed = np.zeros(len(table.rows), dtype=bool)
-        needed[sure.labels.row[use]] = True
+        needed[sure.blocks.row[use]] = True
         rows = [np.flatnonzero(needed[table.set_of == i]) for i in range(len(table.sets))]
         rows = [own if len(own) else np.arange(1) for own in rows]  # measurements have a row
         for i, own in enumerate(rows):
             needed[np.flatnonzero(table.set_of == i)[own]] = True
-        among = np.flatnonzero(needed[sure.labels.row])
+        among = np.flatnonzero(needed[sure.blocks.row])
         predicted = found.fit.equations.prediction.values(end)
         return cls(
             found,

@@ -56,12 +56,12 @@ def cross_validations(found: Solution) -> tuple[CrossValidation, ...]:
     fit = found.fit
     sure = fit.uncertainty
     equations = sure.equations
-    few = len(np.unique(sure.labels.pose)) < _FEWEST or sure.fit.freedom < FEW
-    if sure.mixed or sure.rounded or few or not sure.labels.length.any():
+    few = len(np.unique(sure.blocks.pose)) < _FEWEST or sure.fit.freedom < FEW
+    if sure.mixed or sure.rounded or few or not sure.blocks.length.any():
         return ()
     if found.loss != "linear" or not (fit.end.status == 0).all():
         return ()
-    row, pose = sure.labels.row, sure.labels.pose
+    row, pose = sure.blocks.row, sure.blocks.pose
     blocks = {"regions": _strips(fit)[pose]}
     sessions = [data.measured.session for data in equations.prediction.datasets]
     known = [each for each in sessions if each is not None]
@@ -71,10 +71,14 @@ def cross_validations(found: Solution) -> tuple[CrossValidation, ...]:
             blocks["sessions"] = session[row]
     by_pose = residuals_left_out(sure.tested, numbered(pose))
     at_random = _rms(fit, by_pose)
-    tested = {name: left_out(sure.tested, block) for name, block in blocks.items()}
+    found_of = {}
+    for name, block in blocks.items():
+        plain = left_out(sure.tested, block)
+        alike = plain if sure.own_deviations is None else left_out(sure.weighed.fit, block)
+        found_of[name] = plain.residual, alike.ratio, alike.chance
     return tuple(
-        CrossValidation(name, _rms(fit, each.residual), at_random, each.ratio, each.chance)
-        for name, each in tested.items()
+        CrossValidation(name, _rms(fit, residual), at_random, ratio, chance)
+        for name, (residual, ratio, chance) in found_of.items()
     )
 
 
@@ -93,9 +97,9 @@ def _strips(fit: Fit) -> IntArray:
 def _rms(fit: Fit, whitened: FloatArray) -> float:
     """Rms of the distances that whitened residuals are, mm."""
     sure = fit.uncertainty
-    lengths = sure.labels.length
+    lengths = sure.blocks.length
     squares = sure.in_units(whitened)[lengths] ** 2
-    return float(np.sqrt(squares.sum() / len(np.unique(sure.labels.row[lengths]))))
+    return float(np.sqrt(squares.sum() / len(np.unique(sure.blocks.row[lengths]))))
 
 
 def _worse(found: Solution) -> tuple[CrossValidation, ...]:

@@ -12,6 +12,7 @@ from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.estimator import Estimator
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.fit_data import FitData
+from pkmcal.estimation.solving import solve
 from pkmcal.fitted.dropped import outlying
 from pkmcal.fitted.fit import Fit
 from pkmcal.statistics.robust_scale import median_ratio, ratio_by_chance, robust_ratio
@@ -70,8 +71,8 @@ def robust_check(fit: Fit) -> RobustCheck | None:
     )
     commanded = few.with_exact_actuators()
     try:
-        estimator = Estimator(*few.begin(commanded.at(fit.problem.start.theta)), "cauchy")
-        robust = estimator.solve()
+        estimator = Estimator.of(*few.begin(commanded.at(fit.aligned.theta)), "cauchy")
+        robust = solve(estimator)
     except ValueError:
         return None
     p = robust.state.fitted.rank
@@ -116,7 +117,7 @@ def _rms_of_others(
 def _drawn(fit: Fit) -> list[tuple[FitData, int]]:
     """The fitted rows, or those of some poses if there are more than needed; and their sets."""
     equations = fit.equations
-    pose = fit.uncertainty.poses
+    pose = fit.uncertainty.blocks.pose_of_row
     count = int(pose.max()) + 1
     if count <= _MOST:
         return [(data, i) for i, data in enumerate(equations.prediction.datasets)]

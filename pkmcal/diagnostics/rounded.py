@@ -41,7 +41,8 @@ def _nothing_measured(found: Solution) -> tuple[str, ...]:
         residual = start.residuals[i]
         values = m.values.reshape(residual.shape)
         own = np.array([step_of(values[:, k], unit) for k, unit in enumerate(m.units)])
-        limit = _half(m, own) + reach[i] + ROUNDED * rounding_of(m, start.robot.length)
+        exact = rounding_of(m, start.robot.length, equations.mm[i])
+        limit = _half(m, own) + reach[i] + ROUNDED * exact
         off = np.stack(
             [_but_for_a_shift(*each) for each in zip(values.T, residual.T, strict=True)], axis=1
         )

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from pkmcal.arrays import FloatArray
 from pkmcal.diagnostics.families import GROSS
 from pkmcal.diagnostics.meant import Meant, joined_later, renamed
 from pkmcal.diagnostics.other_readings import exchanges, other_readings
@@ -16,6 +17,7 @@ from pkmcal.display import printable
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.fit_data import FitData
+from pkmcal.estimation.machine_size import compared_by
 from pkmcal.estimation.misfits import of_read
 from pkmcal.estimation.parameters import Parameters
 from pkmcal.measurements.measurements import Measurements
@@ -27,17 +29,20 @@ _MOST_TARGETS = 4  # whose orders are tried
 
 
 def likely_mistakes(
-    datasets: Sequence[FitData], parameters: Parameters, evaluation: Evaluation
+    datasets: Sequence[FitData], parameters: Parameters, evaluation: Evaluation | None
 ) -> list[str]:
     """Suspect units and columns, else rows and targets; two of them where one explains too little.
 
-    Readings of data that fit far better are named.
+    Readings of data that fit far better are named. Of those that were refused before anything was
+    evaluated units and columns are suspected.
     """
     tensions = [data.measured.tension for data in datasets]
     pulled = any(tension is not None and tension.any() for tension in tensions)
     if not pulled and all(name.endswith(".stretch") for name in parameters.names):
         return ["no row states a tension: columns tension.q1 [N] … (tension=)"]
     found = likely_unit_errors(datasets, parameters, evaluation)
+    if evaluation is None:
+        return found
     found = found or likely_row_errors(datasets, parameters)
     size = GROSS * parameters.robot.length
     sets = [data.measured for data in datasets]
@@ -63,18 +68,21 @@ def likely_mistakes(
     return both or found
 
 
-def likely_row_errors(datasets: Sequence[FitData], parameters: Parameters) -> list[str]:
-    """Suspect readings beside the wrong rows and exchanged targets, at the nominal machine.
+def likely_row_errors(
+    datasets: Sequence[FitData], parameters: Parameters, *, near: FloatArray | None = None
+) -> list[str]:
+    """Suspect readings beside the wrong rows and exchanged targets.
 
-    A reading of the data that fits far better is named.
+    A reading of the data that fits far better is named, at the present machine or at parameters
+    `near` (n,) it.
     """
     found, sets = [], [data.measured for data in datasets]
     for i, data in enumerate(datasets):
         if not data.measured.components:
             continue
-        present = _median(data, parameters)
+        present = _median(data, parameters, near)
         trials = {
-            meant: _median(replace(data, measured=other), parameters)
+            meant: _median(replace(data, measured=other), parameters, near)
             for meant, other in _readings(data)
         }
         if not trials:
@@ -94,17 +102,15 @@ def _off(value: float) -> str:
     return f"{value:.4g} mm" if np.isfinite(value) else "more than the machine reaches"
 
 
-def _median(data: FitData, parameters: Parameters) -> float:
-    """Median distance of the readings from the nominal machine, mm; inf where most fail."""
+def _median(data: FitData, parameters: Parameters, near: FloatArray | None = None) -> float:
+    """Median distance of the readings from the machine, mm; inf where most fail."""
     try:
-        start = Equations.of([data], parameters).with_exact_actuators().start()
+        start = Equations.of([data], parameters).with_exact_actuators().start(near)
     except ValueError:
         return float("inf")
     read = np.isfinite(data.measured.values.reshape(start.residuals[0].shape)).any(axis=1)
     whole = of_read(data.measured, start.residuals[0])
-    length = parameters.robot.length
-    mm = data.measured.instrument.mm(data.measured, length)
-    off = np.linalg.norm(whole * mm, axis=1)[read]
+    off = np.linalg.norm(whole * compared_by(parameters.robot, data.measured), axis=1)[read]
     return float(np.median(np.where(np.isfinite(off), off, np.inf))) if read.any() else np.inf
 
 

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
+from pkmcal.arrays import rms
 from pkmcal.diagnostics.check import Check, Level, Remedy, at_most_one
 from pkmcal.diagnostics.copies import copies
 from pkmcal.diagnostics.robust_check import RobustCheck, robust_check
 from pkmcal.diagnostics.row_errors import likely_row_errors
+from pkmcal.estimation.machine_size import stated_size
 from pkmcal.fitted.row_names import row_names
 from pkmcal.fitted.slack import SlackCable, listed_slack
 from pkmcal.fitted.solution import Solution
+from pkmcal.readings.orientation import between
 
 _ABSURD = 0.02  # share of the spread of the commanded positions that no sound fit leaves
 _CAUCHY = Remedy("loss", "cauchy")
@@ -49,6 +52,8 @@ def _against_disagreement(found: Solution, robust: RobustCheck) -> tuple[Remedy,
 def _much_left(found: Solution) -> tuple[tuple[float, float], ...]:
     """Rms of the residuals and of the commanded positions, mm, where the first is absurd."""
     start = found.fit.start
+    if np.isinf(stated_size(found.fit.equations)):
+        return ()  # positions of an arm without lengths are its errors
     places = start.pose[np.asarray(start.status == 0), :3]
     spread = float(np.sqrt(((places - places.mean(axis=0)) ** 2).sum(axis=1).mean()))
     left = float(np.nanmax([found.distances.rms_without_outliers, found.closure_rms, 0.0]))
@@ -56,12 +61,41 @@ def _much_left(found: Solution) -> tuple[tuple[float, float], ...]:
 
 
 def _much_left_text(found: Solution, sizes: tuple[float, float]) -> str:
-    likely = likely_row_errors(found.fit.equations.prediction.datasets, found.fit.parameters)
-    cause = (
-        "; ".join(likely) or "check that robot file and measurements belong together, row by row"
-    )
     left, spread = sizes
-    return f"{left:.3g} mm rms are left where the machine moved about by {spread:.3g} mm: {cause}"
+    moved = f"{left:.3g} mm rms are left where the machine moved about by {spread:.3g} mm"
+    return f"{moved}: {_likely_cause(found)}"
+
+
+def _likely_cause(found: Solution) -> str:
+    """Say why rows may not fit at all."""
+    likely = likely_row_errors(found.fit.equations.prediction.datasets, found.fit.parameters)
+    return "; ".join(likely) or "check that robot file and measurements belong together, row by row"
+
+
+def _much_turned(found: Solution) -> tuple[tuple[float, float], ...]:
+    """Rms of the angles' residuals and of the turnings, rad, of an arm without lengths."""
+    start, end, equations = found.fit.start, found.fit.end, found.fit.equations
+    if not np.isinf(stated_size(equations)):
+        return ()
+    off = [
+        end.residuals[i][:, list(family.columns)].ravel()
+        for i, m in enumerate(equations.table.sets)
+        for family in m.instrument.families
+        if family.unit == "rad" and m.instrument.turning is not None
+    ]
+    if not off:
+        return ()
+    turned = start.pose[np.asarray(start.status == 0), 3:]
+    about = between(turned, np.repeat(turned[:1], len(turned), axis=0))
+    spread = rms(np.linalg.norm(about - about.mean(axis=0), axis=1))
+    left = float(np.sqrt(3.0) * np.sqrt(np.nanmean(np.concatenate(off) ** 2)))
+    return at_most_one((left, spread) if left > _ABSURD * spread > 0 else None)
+
+
+def _much_turned_text(found: Solution, sizes: tuple[float, float]) -> str:
+    left, spread = np.degrees(sizes)
+    turned = f"{left:.3g} deg rms are left where the machine turned about by {spread:.3g} deg"
+    return f"{turned}: {_likely_cause(found)}"
 
 
 def _slack(found: Solution, left_out: bool) -> tuple[tuple[SlackCable, ...], ...]:
@@ -84,6 +118,11 @@ CHECKS = (
     Check(
         name="much-left", about="the residuals are larger than any sound fit leaves",
         levels=("grave",), run=_much_left, say=_much_left_text,
+    ),
+    Check(
+        name="much-turned", about="angles of an arm without lengths are off by more than any sound"
+        " fit leaves",
+        levels=("grave",), run=_much_turned, say=_much_turned_text,
     ),
     Check(
         name="rows-left-out", about="rows were left out as asked", levels=("remark",),

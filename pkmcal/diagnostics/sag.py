@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from pkmcal.diagnostics.cause_columns import waves_a_turn
+from pkmcal.diagnostics.cause_columns import ratios_of_followers, waves_a_turn
 from pkmcal.diagnostics.causes import HARMFUL, SURE
 from pkmcal.diagnostics.check import Check, Remedy, at_most_one
 from pkmcal.effects.effect import Changed
@@ -16,24 +16,9 @@ from pkmcal.fitted.left_out import Comparison, compared_by_poses, effect_columns
 from pkmcal.fitted.solution import Solution
 from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.statistics.causes import causes
-from pkmcal.statistics.score_test import Columns
+from pkmcal.statistics.score_test import Columns, beside
 
 NUMBERS = ("sag", "compliance")  # with which the names of sag begin
-
-
-class SagFinding(NamedTuple):
-    """The gain by sag that a fit lacks.
-
-    Attributes
-    ----------
-    effect : Sag
-        What would help.
-    comparison : Comparison
-        The poses left out.
-    """
-
-    effect: Sag
-    comparison: Comparison
 
 
 class LackingSag(NamedTuple):
@@ -48,14 +33,17 @@ class LackingSag(NamedTuple):
     wave : Harmonics or None
         A wave a turn of one joint beside which sag explains nothing: an eccentric encoder makes the
         wave that the weight of the joint's own link does.
+    more : bool
+        Whether that wave explains what sag does not.
     """
 
     effect: Sag
     comparison: Comparison
-    wave: Harmonics | None
+    wave: Harmonics | None = None
+    more: bool = False
 
 
-def sag_that_helps(fit: Fit) -> SagFinding | None:
+def sag_that_helps(fit: Fit) -> LackingSag | None:
     """The sag of an arm that a fit lacks and that helps at poses left out; None where none does.
 
     First that of the main joints against what was fitted, then that of all joints against the
@@ -75,7 +63,7 @@ def sag_that_helps(fit: Fit) -> SagFinding | None:
             continue
         against_fit = gained if found is None else compared_by_poses(fit, [changed])
         if against_fit is not None:
-            found, before = SagFinding(effect, against_fit), before | lacking
+            found, before = LackingSag(effect, against_fit), before | lacking
     return found
 
 
@@ -102,24 +90,40 @@ def _lacking(found: Solution) -> tuple[LackingSag, ...]:
     helps = sag_that_helps(found.fit)
     if helps is None:
         return ()
-    machine = found.fit.parameters.robot
-    columns = effect_columns(found.fit, [helps.effect.of_machine(machine)])
-    return (LackingSag(*helps, None if columns is None else _alike(found.fit, columns)),)
+    columns = effect_columns(found.fit, [helps.effect.of_machine(found.fit.parameters.robot)])
+    if columns is None:
+        return (helps,)
+    return () if _is_ratio(found, columns) else (_beside_waves(found, helps, columns),)
 
 
-def _alike(fit: Fit, sag: Columns) -> Harmonics | None:
-    """The wave a turn of one joint that explains all that sag does; None where none does."""
+def _is_ratio(found: Solution, sag: Columns) -> bool:
+    """Return whether one ratio by which a joint follows another one explains more than sag does."""
+    fit, weighed = found.fit, found.weighed
+    machine = fit.parameters.robot
+    by_sag = beside(weighed.fit, weighed.columns(sag))
+    for _, ratio in ratios_of_followers(machine):
+        columns = effect_columns(fit, [ratio.of_machine(machine)])
+        own = None if columns is None else beside(weighed.fit, weighed.columns(columns))
+        if own is not None and own.chance < SURE and (by_sag is None or own.drop > by_sag.drop):
+            score = own.score()
+            if score is not None and score.chance < SURE:
+                return True
+    return False
+
+
+def _beside_waves(found: Solution, helps: LackingSag, sag: Columns) -> LackingSag:
+    """The gain by sag, and the wave a turn of one joint that explains all that sag does."""
+    fit = found.fit
     machine = fit.parameters.robot
     by_wave = [
         (each, effect_columns(fit, [each.of_machine(machine)])) for each in waves_a_turn(machine)
     ]
     there = [(each, columns) for each, columns in by_wave if columns is not None]
-    (best, *_) = causes(fit.uncertainty.tested, [sag, *(own for _, own in there)], SURE, 1) or (
-        None,
-    )
-    if best is None or best.cause == 0 or 0 not in best.also:
-        return None
-    return there[best.cause - 1][0]
+    explained = causes(found.weighed, [sag, *(own for _, own in there)], SURE, 1)
+    if not explained or explained[0].cause == 0 or 0 not in explained[0].spent:
+        return helps
+    (best,) = explained
+    return helps._replace(wave=there[best.cause - 1][0], more=0 not in best.also)
 
 
 def _in_it(found: Solution) -> tuple[Comparison, ...]:
@@ -140,7 +144,7 @@ def _say_lacking(found: Solution, lacking: LackingSag) -> str:
     )
     also = (
         f"; a wave a turn of joint {wave.joints}, as of an eccentric encoder or a tilted axis,"
-        f" explains as much: {Remedy('effects', (wave,))}"
+        f" explains {'that and more' if lacking.more else 'as much'}: {Remedy('effects', (wave,))}"
         if wave is not None
         else ""
     )

@@ -49,7 +49,7 @@ def _kept(found: Solution) -> int:
 def _kept_text(found: Solution, count: int) -> str:
     worst = found.fit.estimate.state.worst
     which = "combinations of parameters are" if count > 1 else "combination of parameters is"
-    size = worst == found.fit.start.robot.length
+    size = worst == found.fit.estimator.size
     why = "the machine's size" if size else "and the search did not end with them"
     return (
         f"{count} {which} determined to no better than {worst:.3g} mm, {why}, and kept as before:"

@@ -13,11 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import BoolArray
+from pkmcal.diagnostics.causes import beside_causes
 from pkmcal.diagnostics.check import RARE, Check, Level, at_most_one
-from pkmcal.diagnostics.two_machines import equations_of_visits, fit_of, tested
+from pkmcal.diagnostics.two_machines import equations_of_visits, tested, weighed_alike
 from pkmcal.diagnostics.visits import visits_of
 from pkmcal.display import chance_text
 from pkmcal.fitted.solution import Solution
+from pkmcal.statistics.linear_fit import LinearFit
 
 _FAR = 1.5  # times what noise lets expect, above which ± do not hold
 _TRAVEL = 1e-3  # of the machine's length, from which poses have sides
@@ -66,9 +68,19 @@ def sides(found: Solution) -> Sides | None:
         return None
     if not (found.fit.end.status == 0).all():
         return None
+    weighed = weighed_alike(found)
+    seen = _worst(found, weighed.fit)
+    if seen is None or seen.chance >= RARE:
+        return seen
+    explained = beside_causes(found, weighed, seen.residual)
+    return seen if explained is None else _worst(found, explained)
+
+
+def _worst(found: Solution, fit: LinearFit) -> Sides | None:
+    """The way to divide the poses that shows the largest difference."""
     groups = dict(_groups(found))
     use, key = equations_of_visits(found, visits_of(found))
-    known = tested(found, fit_of(found), groups, use, key) if groups else {}
+    known = tested(found, fit, groups, use, key) if groups else {}
     if not known:
         return None
     where = min(known, key=lambda each: known[each].chance)
@@ -96,7 +108,8 @@ def _level(found: Solution, seen: Sides) -> Level | None:
 CHECKS = (
     Check(
         name="sides", about="the two sides of the workspace fit better apart",
-        unless=("grave", "copies", "two-machines", "displaced-target", "follows-loads"),
+        unless=("grave", "copies", "two-machines", "displaced-target", "follows-loads",
+                "sag-lacking"),
         levels=("doubt", "remark"),
         run=lambda found: at_most_one(sides(found)), level_of=_level,
         say=lambda found, seen: str(seen),

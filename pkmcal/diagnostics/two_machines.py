@@ -7,22 +7,25 @@ the number of all, so that the search for it makes no false alarm where noise is
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, IntArray
+from pkmcal.diagnostics.causes import beside_causes
 from pkmcal.diagnostics.check import RARE
+from pkmcal.diagnostics.columns import of_actuators
 from pkmcal.diagnostics.reach import reach
 from pkmcal.diagnostics.visits import Visits, visits_of
 from pkmcal.display import chance_text, first_rows, printable
-from pkmcal.estimation.mixed_noise import of_own_noises
 from pkmcal.estimation.uncertainty import Uncertainty
 from pkmcal.fitted.solution import Solution
+from pkmcal.statistics.alike import drawn_alike
 from pkmcal.statistics.distributions import f_tail
 from pkmcal.statistics.group_test import Groups, few_equations, group_test, within_reach
 from pkmcal.statistics.linear_fit import ROUNDING, LinearFit, numbered, orthonormal, reweighted
 from pkmcal.statistics.two_regressions import best_division
+from pkmcal.statistics.weighed import Weighed
 
 _LARGE = 0.8  # times the residuals, above which errors of a model may be as large
 _FAR = 0.7  # times the residuals, below which rows in no order, or elsewhere, are of another
@@ -88,23 +91,81 @@ def apart(found: Solution) -> Apart | None:
         return None
     visits = visits_of(found)
     use, key = equations_of_visits(found, visits)
+    weighed = weighed_alike(found)
+    seen = _apart(found, weighed.fit, visits, use, key)
+    if seen is None or not seen.found:
+        return seen
+    explained = beside_causes(found, weighed, seen.residual)
+    return seen if explained is None else _apart(found, explained, visits, use, key)
+
+
+def _apart(
+    found: Solution, fit: LinearFit, visits: Visits, use: IntArray, key: IntArray
+) -> Apart | None:
+    """Test groups that are known beforehand; then any rows, where that is not large."""
     groups = dict(_groups(found, visits))
-    fit = fit_of(found)
-    known = tested(found, fit, groups, use, key)
-    seen = None
-    if known:
-        name = min(known, key=lambda each: known[each].chance)
-        best = known[name]
-        chance = min(1.0, len(known) * best.chance)
-        seen = Apart(name, chance, best.apart, _elsewhere(found, groups[name], visits))
+    seen = _of_groups(found, fit, groups, visits, use, key)
+    if seen is not None and seen.found:
+        drawn = (_of_groups(found, each, groups, visits, use, key)
+                 for each in _drawn_alike(found, fit, visits, use))  # fmt: skip
+        seen = _unless_as_likely(seen, drawn)
         if seen.found and seen.large:
             return seen
     other = _in_no_order(found, fit, visits, use, key)
-    return other if other is not None and other.found else seen
+    if other is None or not other.found:
+        return seen
+    drawn = (_in_no_order(found, each, visits, use, key)
+             for each in _drawn_alike(found, fit, visits, use))  # fmt: skip
+    other = _unless_as_likely(other, drawn)
+    return other if other.found else seen
+
+
+def _of_groups(
+    found: Solution, fit: LinearFit, groups: Mapping[str, BoolArray], visits: Visits,
+    use: IntArray, key: IntArray,
+) -> Apart | None:  # fmt: skip
+    """Test groups that are known beforehand, and return the one that fits worst."""
+    known = tested(found, fit, groups, use, key)
+    if not known:
+        return None
+    name = min(known, key=lambda each: known[each].chance)
+    best = known[name]
+    chance = min(1.0, len(known) * best.chance)
+    return Apart(name, chance, best.apart, _elsewhere(found, groups[name], visits))
+
+
+def _unless_as_likely(seen: Apart, drawn: Iterator[Apart | None]) -> Apart:
+    """The difference, with the chance that draws of one machine show; tests of it stop at one."""
+    count = 1
+    for other in drawn:
+        if other is not None and other.chance <= seen.chance:
+            return replace(seen, chance=max(seen.chance, 1.0 / count))
+        count += 1
+    return seen
+
+
+def _drawn_alike(
+    found: Solution, fit: LinearFit, visits: Visits, use: IntArray
+) -> Iterator[LinearFit]:
+    """Fits of residuals as of one machine."""
+    sure = found.fit.uncertainty
+    visit = numbered(visits.series, visits.visit)[row_of_equation(sure)][use]
+    by_actuator = None if sure.mixed else _by_actuator(found)
+    return drawn_alike(fit, use, numbered(visit), sure.blocks.component[use], by_actuator)
+
+
+def _by_actuator(found: Solution) -> FloatArray | None:
+    """What each actuator moves of equations (M, n); None where poses have unknowns."""
+    count = found.fit.estimate.evaluation.actuators.shape[1]
+    columns = of_actuators(found.fit, lambda poses: np.tile(np.eye(count), (len(poses), 1, 1)))
+    if columns is None:
+        return None
+    parts = [some for _, some in weighed_alike(found).columns(columns)()]
+    return np.concatenate(parts) if parts else None
 
 
 def equations_of_visits(found: Solution, visits: Visits) -> tuple[IntArray, IntArray]:
-    """Equations (u,) without outliers, and the visit and the component of each.
+    """Equations (u,) without outliers and idle ones, and the visit and the component of each.
 
     Of mixtures each stands for itself: components of two poses are unlike.
     """
@@ -112,20 +173,21 @@ def equations_of_visits(found: Solution, visits: Visits) -> tuple[IntArray, IntA
     row = row_of_equation(sure)
     odd = np.isin(sure.equations.table.rows, found.outliers)
     if sure.mixed:
-        block = sure.equations.blocks.block_of_row
-        use = np.flatnonzero(~np.isin(sure.labels.row, block[odd]))
+        block = sure.blocks.block_of_row
+        use = sure.fit.without_idle(np.flatnonzero(~np.isin(sure.blocks.row, block[odd])))
         return use, np.arange(len(use))
     use = sure.fit.without_idle(np.flatnonzero(~odd[row]))
     visit = visits.series[row][use], visits.visit[row][use]
-    return use, numbered(*visit, sure.labels.component[use])
+    return use, numbered(*visit, sure.blocks.component[use])
 
 
 def row_of_equation(sure: Uncertainty) -> IntArray:
     """Row of each equation (M,), of a mixture the first of its pose."""
+    row: IntArray = sure.blocks.row
     if not sure.mixed:
-        return sure.labels.row
-    block, first = np.unique(sure.equations.blocks.block_of_row, return_index=True)
-    counted: IntArray = first[block >= 0][sure.labels.row]
+        return row
+    block, first = np.unique(sure.blocks.block_of_row, return_index=True)
+    counted: IntArray = first[block >= 0][row]
     return counted
 
 
@@ -134,7 +196,7 @@ def tested(
 ) -> dict[str, Groups]:
     """Test each group of rows (N,) against the others; without those too small to be tested.
 
-    `fit` is that of `fit_of`.
+    `fit` is that of `weighed_alike`.
     """
     sure = found.fit.uncertainty
     row = row_of_equation(sure)
@@ -147,22 +209,16 @@ def tested(
     return {name: each for name, each in every.items() if each is not None}
 
 
-def fit_of(found: Solution) -> LinearFit:
-    """The fit of which equations are equally uncertain and independent of each other.
-
-    Also where a stated sigma, or that of the actuators, is wrong of some of them.
-    """
+def weighed_alike(found: Solution) -> Weighed:
+    """`Solution.weighed`, in which sets whose noise nobody stated have it in common."""
     sure = found.fit.uncertainty
     system = sure.equations.system
-    if system is None or sure.equations.blocks.unstated.all():
+    if system is None or sure.blocks.unstated.all():
         return _with_sets_alike(sure)
-    use = np.zeros(len(sure.fit.residual), dtype=bool)
-    use[equations_of_visits(found, visits_of(found))[0]] = True
-    evaluation = found.fit.estimate.evaluation
-    return of_own_noises(*sure.tested_with_prior, system, evaluation, sure.factors, use)
+    return found.weighed
 
 
-def _with_sets_alike(sure: Uncertainty) -> LinearFit:
+def _with_sets_alike(sure: Uncertainty) -> Weighed:
     """The fit in which sets whose noise nobody stated have that of the same component of others.
 
     A set of another machine may have got a noise that is what common numbers miss of it: then it
@@ -170,15 +226,17 @@ def _with_sets_alike(sure: Uncertainty) -> LinearFit:
     """
     (fit, beyond), equations = sure.of_own_deviations, sure.equations
     if sure.mixed or len(equations.table.sets) == 1 or equations.whole is not None:
-        return fit
+        return sure.weighed
     group = equations.whitening.of_equations(equations.whitening.groups)
     unstated = equations.blocks.unstated[group]
     own = np.where(unstated, np.log(sure.factors[group]), 0.0)
-    alike = numbered(sure.labels.component, unstated.astype(np.intp))
+    alike = numbered(sure.blocks.component, unstated.astype(np.intp))
     common = (np.bincount(alike, own) / np.bincount(alike))[alike]
     if np.allclose(own, common):
-        return fit
-    return reweighted(fit, np.exp(common - own), beyond)[0]
+        return sure.weighed
+    deviations = np.exp(common - own)
+    before = 1.0 if sure.own_deviations is None else sure.own_deviations
+    return Weighed(reweighted(fit, deviations, beyond)[0], before * deviations)
 
 
 def _in_no_order(

@@ -16,9 +16,11 @@ from pkmcal.diagnostics.other_readings import other_readings
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.fit_data import FitData
+from pkmcal.estimation.machine_size import compared_by
 from pkmcal.estimation.parameters import Parameters
 from pkmcal.exceptions import ArgumentError
 from pkmcal.fitted.solution import Solution
+from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.measurements.measurements import Measurements
 
 MISFIT_RATIO = 0.2  # of the misfit that another reading may leave to be named as what was meant
@@ -28,7 +30,7 @@ _POOR = 0.1  # share of the misfit that a fit worth its name does not leave
 def likely_unit_errors(
     datasets: Sequence[FitData],
     parameters: Parameters,
-    evaluation: Evaluation,
+    evaluation: Evaluation | None,
     *,
     near: FloatArray | None = None,
     least: float = GROSS,
@@ -36,19 +38,23 @@ def likely_unit_errors(
     """Suspect units or exchanged columns in measurements that are grossly off.
 
     Each set is read in other units and with columns exchanged; a reading that fits far better is
-    named. Where some rows are out of reach as given, it has to fit better than the others do.
+    named. Where some rows are out of reach as given, it has to fit better than the others do; where
+    they were refused before anything was evaluated, most have to fit.
     They are read at the present machine, or at parameters `near` (n,) it; what is off by no more
     than a share `least` of the machine's size is not suspected.
     """
-    size = parameters.robot.length
+    size, together = parameters.robot.length, _together if evaluation is not None else _typical
     found = []
     for i, data in enumerate(datasets):
-        read = np.isfinite(data.measured.values.reshape(evaluation.residuals[i].shape))
+        values = data.measured.values
+        residual = values if evaluation is None else evaluation.residuals[i]
+        read = np.isfinite(values.reshape(residual.shape))
         if not read.any():
             continue
-        residual = np.where(read, evaluation.residuals[i], 0.0)
-        off = _misfits(residual, data.measured, size)
-        present = _together(off)
+        off = np.full(len(values), np.nan)
+        if evaluation is not None:
+            off = _misfits(np.where(read, residual, 0.0), data.measured, parameters.robot)
+        present = together(off)
         if present <= least * size:
             continue
         trials = {
@@ -57,17 +63,19 @@ def likely_unit_errors(
             if (shrunk := _shrunk(data.measured, other)) > 0.0
         }
         # smaller numbers misfit by less, whatever they mean: a machine without lengths fits any
-        misfit = {meant: _together(off) / by for meant, (off, by) in trials.items()}
+        misfit = {meant: together(off) / by for meant, (off, by) in trials.items()}
         # exchanges that are equivalent on a symmetric machine misfit alike
         lowest = min(misfit.values())
         meant = next(each for each in trials if misfit[each] <= lowest * (1.0 + TIED))
-        if misfit[meant] < MISFIT_RATIO * present and _better_where_reached(trials[meant][0], off):
+        most = GROSS * size if evaluation is None else MISFIT_RATIO * present
+        if misfit[meant] < most and _better_where_reached(trials[meant][0], off):
             which = f"measurements {i + 1}: " if len(datasets) > 1 else ""
             where = (
                 f"off by {present:.3g} mm" if np.isfinite(present) else "out of the machine's reach"
             )
+            given = "readings are off" if evaluation is None else f"{where} as given, but"
             found.append(
-                f"{which}{where} as given, but by {_together(trials[meant][0]):.3g} mm if"
+                f"{which}{given} by {together(trials[meant][0]):.3g} mm if"
                 f" {meant.among([each.measured for each in datasets])}"
             )
     return found
@@ -86,7 +94,7 @@ def _read_as(
         residual = np.where(read, _alone(data, parameters, near), 0.0)
     except ArgumentError:  # such readings are refused
         return np.full(len(data.measured), np.nan)
-    return _misfits(residual, data.measured, parameters.robot.length)
+    return _misfits(residual, data.measured, parameters.robot)
 
 
 def _shrunk(given: Measurements, other: Measurements) -> float:
@@ -100,15 +108,20 @@ def _shrunk(given: Measurements, other: Measurements) -> float:
     return min(1.0, float(after / before)) if before > 0.0 else 1.0
 
 
-def _misfits(residual: FloatArray, measured: Measurements, size: float) -> FloatArray:
+def _misfits(residual: FloatArray, measured: Measurements, robot: Calibratable) -> FloatArray:
     """Residual of each row, mm; angles as their arc. NaN if the row is not reached."""
-    off: FloatArray = np.linalg.norm(residual * measured.instrument.mm(measured, size), axis=1)
+    off: FloatArray = np.linalg.norm(residual * compared_by(robot, measured), axis=1)
     return off
 
 
 def _together(off: FloatArray) -> float:
     """Root mean square of all rows; inf if one is not reached."""
     return rms(off) if np.isfinite(off).all() else float("inf")
+
+
+def _typical(off: FloatArray) -> float:
+    """Median of all rows, of which some may be solved in another assembly mode."""
+    return float(np.median(np.where(np.isfinite(off), off, np.inf)))
 
 
 def _better_where_reached(trial: FloatArray, off: FloatArray) -> bool:

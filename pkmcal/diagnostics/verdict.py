@@ -9,7 +9,7 @@ from typing import Any, Literal
 from pkmcal.arguments import instance
 from pkmcal.diagnostics.check import Check, Said
 from pkmcal.diagnostics.checks import CHECKS
-from pkmcal.diagnostics.diagnosis import Diagnosis, verified
+from pkmcal.diagnostics.diagnosis import statements, verified
 from pkmcal.diagnostics.gain import change
 from pkmcal.fitted.solution import Solution
 
@@ -93,7 +93,7 @@ def diagnose(
     'coarse'
     """
     instance("found", found, Solution, ", which `identify` returns")
-    said = Diagnosis(found, verified(checks), {} if findings is None else findings).said()
+    said = statements(found, verified(checks), {} if findings is None else findings)
     warned = {check.name for check in checks if check.at_once}
     grave = [each.text for each in said if each.level == "grave"]
     doubts = [each for each in said if each.level == "doubt"]

@@ -72,9 +72,9 @@ def scan_waves(found: Solution, waves: Sequence[int] = WAVES) -> tuple[Wave, ...
     """
     fit, sure = found.fit, found.fit.uncertainty
     arm = as_arm(fit.end.robot)
-    if arm is None or sure.mixed or fit.estimate.state.loss.name != "linear":
+    if arm is None or sure.mixed or fit.estimate.state.loss != "linear":
         return ()
-    pose = numbered(sure.labels.pose)
+    pose = numbered(sure.blocks.pose)
     if int(pose.max()) + 1 < LEAST_POSES:
         return ()
     theta, by_joint = _along_joints(found, pose)
@@ -89,16 +89,18 @@ def _along_joints(found: Solution, pose: np.ndarray) -> tuple[FloatArray, FloatA
     """Joint coordinates of each pose (K, n), and whitened readings by each joint (M, n)."""
     fit, sure = found.fit, found.fit.uncertainty
     equations = sure.equations
-    machine, table = fit.end.robot, equations.table
-    twists = machine.actuator_twists(fit.end.pose, table.actuators)
+    arm, table = as_arm(fit.end.robot), equations.table
+    assert arm is not None
+    theta = arm.joint_coordinates(table.actuators)
+    twists = arm.joint_jacobian(table.actuators, frame="tip")
     seen = equations.prediction.predicted(fit.end)
     parts = [each.by_twist @ twists[place] for each, place in zip(seen, table.pose_of, strict=True)]
     white = [
         equations.whitening.whiten_rows(part, i, slice(0, len(part)), sure.factors)
         for i, part in enumerate(parts)
     ]
-    row = sure.labels.row
-    of_rows = np.concatenate([table.actuators[place] for place in table.pose_of])[row]
+    row = sure.blocks.row
+    of_rows = np.concatenate([theta[place] for place in table.pose_of])[row]
     first = np.unique(pose, return_index=True)[1]
     return of_rows[first], np.concatenate(white)
 

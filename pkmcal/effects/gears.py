@@ -21,6 +21,7 @@ from pkmcal.kinematics.arm_machine import ArmMachine
 from pkmcal.kinematics.calibratable import Calibratable, as_arm
 
 _TURNS = 1e-3  # rad: how large errors of gears are, more or less; of slides as many mm/m of an arm
+_FOLLOWED = 0.1  # share of a ratio that is stated, by which it may be wrong, more or less
 Joints = Literal["all"] | int | Sequence[int]
 
 
@@ -77,7 +78,9 @@ class Harmonics:
         arm = _arm(machine, "harmonics")
         joints = _joints(arm, self.joints)
         terms = [Term(i, kind, k) for i in joints for k in self._waves() for kind in ("cos", "sin")]
-        return _changed(self.name, arm, terms, self.turns)
+        return _changed(
+            self.name, arm, terms, [number("turns", self.turns, above=0.0)] * len(terms)
+        )
 
 
 @dataclass(frozen=True)
@@ -90,14 +93,20 @@ class Coupling:
     ----------
     pairs : sequence of (int, int)
         A joint and the one that turns it, counted from 1.
-    ratio : float
-        Standard deviation of each number, the share of the other joint's turn.
+    ratio : float, optional
+        Standard deviation of each number, the share of the other joint's turn: its prior. By
+        default 0.001, and a tenth of the ratio that the arm states where the joint follows.
     """
 
     pairs: Sequence[tuple[int, int]]
-    ratio: float = _TURNS
+    ratio: float | None = None
 
     name = "coupling"
+
+    @property
+    def option(self) -> str:
+        """The effect as a word of ``--effects``."""
+        return f"coupling={':'.join(f'{joint}.{other}' for joint, other in self.pairs)}"
 
     def of_machine(self, machine: Calibratable) -> Changed:
         """The arm with these numbers.
@@ -112,11 +121,15 @@ class Coupling:
             np.shape(pair) != (2,) for pair in self.pairs
         ):
             raise ArgumentError(f"coupling: pairs of joints, such as (5, 4); found {self.pairs!r}")
-        terms = []
+        terms, sigmas = [], []
+        stated = arm.followers.table() or {}
         for pair in self.pairs:
             joint, other = _joints(arm, pair) if pair[0] < pair[1] else _joints(arm, pair)[::-1]
             terms.append(Term(joint, "coupling", other))
-        return _changed(self.name, arm, terms, self.ratio)
+            follows = abs(stated.get(joint + 1, {}).get(other + 1, 0.0))
+            own = max(_TURNS, _FOLLOWED * follows) if self.ratio is None else self.ratio
+            sigmas.append(number("ratio", own, above=0.0))
+        return _changed(self.name, arm, terms, sigmas)
 
 
 @dataclass(frozen=True)
@@ -148,7 +161,9 @@ class Backlash:
         """
         arm = _arm(machine, self.name)
         terms = [Term(i, "backlash") for i in _joints(arm, self.joints)]
-        return _changed(self.name, arm, terms, self.turns)
+        return _changed(
+            self.name, arm, terms, [number("turns", self.turns, above=0.0)] * len(terms)
+        )
 
 
 def _arm(machine: Calibratable, effect: str) -> SerialArm:
@@ -160,14 +175,13 @@ def _arm(machine: Calibratable, effect: str) -> SerialArm:
     return arm
 
 
-def _changed(name: str, arm: SerialArm, terms: Sequence[Term], turns: float) -> Changed:
-    """The arm with these terms, free with a prior of `turns`; of slides its arc."""
-    sigma = number("turns", turns, above=0.0)
+def _changed(name: str, arm: SerialArm, terms: Sequence[Term], sigmas: Sequence[float]) -> Changed:
+    """The arm with these terms, free with priors of these deviations; of slides the arcs."""
     free = {
         term.name: sigma * arm.length
         if arm.kinds[term.joint] == "prismatic" and term.kind != "coupling"
         else sigma
-        for term in terms
+        for term, sigma in zip(terms, sigmas, strict=True)
     }
     return Changed(name, ArmMachine(arm.with_terms(terms)), free)
 

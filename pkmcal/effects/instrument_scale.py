@@ -14,10 +14,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
-from pkmcal.core import screws
 from pkmcal.effects.effect import Moved
 from pkmcal.geometry.stated_uncertainty import SCALE
 from pkmcal.measurements.measurements import Measurements
+from pkmcal.readings.reading import Reading
 from pkmcal.readings.unknowns import Dependence, Numbers
 
 _TYPICAL = 1e-3  # of a length: what moves a reading as much as 1 mm does at a distance of 1 m
@@ -39,14 +39,14 @@ class InstrumentScale:
         yield Dependence(SCALE, SCALE, given, {"": number}, every)
 
     def of_rows(self, measured: Measurements) -> ScaledRows:
-        """The effect in rows of one kind: distances count from their anchors.
+        """The effect in rows of one kind.
 
         Rows that all read the same were touched, whether they say so or not: the machine was driven
         until the instrument read it, and its scale moves none of them.
         """
-        touched = measured.touched is not None or not np.ptp(measured.values, axis=0).any()
+        touched = measured.instrument.by_contact or not np.ptp(measured.values, axis=0).any()
         reads = "mm" in measured.units and not touched
-        return ScaledRows(reads, measured.instrument.point == "base")
+        return ScaledRows(reads, measured.instrument)
 
 
 @dataclass(frozen=True)
@@ -57,12 +57,12 @@ class ScaledRows:
     ----------
     reads : bool
         Whether they are lengths that an instrument reads.
-    anchored : bool
-        Whether they are distances from a fixed point.
+    reading : Reading
+        Their kind.
     """
 
     reads: bool
-    anchored: bool
+    reading: Reading
 
     def moved(
         self,
@@ -74,12 +74,10 @@ class ScaledRows:
     ) -> Moved:
         """Compute the motion of the platform at poses (N, 6) that would give the same readings."""
         scale = numbers[SCALE][rows, 0]
-        place = pose[:, :3]
-        if self.anchored:
-            turned = screws.frames(pose)[:, :3, :3] @ numbers["target"][rows][:, :, None]
-            place = place + turned[:, :, 0] - numbers["anchor"][rows]
+        between = self.reading.reach(pose, {name: each[rows] for name, each in numbers.items()})
+        place = pose[:, :3] if between is None else between
         by = np.concatenate([np.zeros_like(place), place * self.reads], axis=1)
         moved = Moved(by * scale[:, None], {SCALE: by[:, :, None]})
-        if self.anchored or not self.reads:
+        if between is not None or not self.reads:
             return moved
         return moved._replace(growth=scale, growth_by={SCALE: np.ones((len(rows), 1))})

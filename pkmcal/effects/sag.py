@@ -122,10 +122,11 @@ class Sag:
 
 
 def _postures(arm: SerialArm) -> FloatArray:
-    """Joint coordinates all over, which do not depend on what was measured."""
+    """Coordinates of all joints all over, which do not depend on what was measured."""
     turning = np.array([unit == "rad" for unit in arm.actuator_units])
     spread = np.where(turning, np.pi, arm.length)
-    return np.random.default_rng(0).uniform(-1.0, 1.0, (_POSTURES, arm.n_joints)) * spread
+    drawn = np.random.default_rng(0).uniform(-1.0, 1.0, (_POSTURES, arm.n_actuators))
+    return arm.joint_coordinates(drawn * spread)
 
 
 def _products(arm: SerialArm) -> FloatArray:
@@ -133,7 +134,7 @@ def _products(arm: SerialArm) -> FloatArray:
     laws, n = arm.joint_laws, arm.n_joints
     if not laws.pulls.directed:
         raise ArgumentError("gravity must have a direction, found 0 0 0")
-    behind = np.triu(np.ones((n, n))) * np.array([[unit == "rad"] for unit in arm.actuator_units])
+    behind = np.triu(np.ones((n, n))) * np.array([[kind == "revolute"] for kind in arm.kinds])
     products = laws.pulls.products(laws.posture(_postures(arm)))
     return np.asarray(products * behind[..., None])
 

@@ -22,6 +22,7 @@ from pkmcal.core.statistics import Bins, Stream, pose_errors
 from pkmcal.geometry.model import Model
 from pkmcal.kinematics.perturbed import Geometries, forward_of
 from pkmcal.kinematics.robot import Robot
+from pkmcal.progress import Progress
 
 CHUNK = 16_384  # machines that share a seed
 BATCH = 1_024  # of these solved at a time: what fits the cache
@@ -30,7 +31,6 @@ PILOT = 1_024  # machines that determine how wide the bins must be; one batch
 AHEAD = 32  # tasks that are handed to an executor before the first of them is looked at
 
 QUANTITIES = ("x", "y", "z", "alpha", "beta", "gamma", "distance")
-Progress = Callable[[int, int], object]
 Found = TypeVar("Found")
 
 

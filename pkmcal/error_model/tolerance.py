@@ -15,11 +15,12 @@ from pkmcal.arrays import TIED, FloatArray, IntArray, as_numbers, largest_first,
 from pkmcal.core.library import POSE
 from pkmcal.core.statistics import pose_errors
 from pkmcal.display import Table
-from pkmcal.error_model.monte_carlo import Draw, Progress, simulate
+from pkmcal.error_model.monte_carlo import Draw, simulate
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.elastic import is_kinematic
 from pkmcal.kinematics.perturbed import Geometries, Ideal, forward_of, ideal
 from pkmcal.kinematics.robot import Robot, require_parallel
+from pkmcal.progress import Progress
 from pkmcal.result import Result
 
 WORST = 3.0  # standard deviations by which every number is off in the worst case

@@ -18,8 +18,8 @@ from pkmcal.exceptions import FitError
 
 def begun(
     datasets: Sequence[FitData], chosen: Parameters, unread: int
-) -> tuple[Equations, Equations, Evaluation]:
-    """The equations, those with exact actuators, and where these start."""
+) -> tuple[Equations, Evaluation]:
+    """The equations, and where those with exact actuators start."""
     equations = Equations.of(datasets, chosen, unread)
     exact = equations.with_exact_actuators()
     start = start_in_modes(exact)
@@ -29,23 +29,20 @@ def begun(
         start = exact.start(states=better.onward)
     if start.ok:  # what it began with is needed of rows that failed alone, and takes memory
         start = replace(start, begun=start.states)
-    equations = equations.with_parameters(start.parameters)
-    return equations, equations.with_exact_actuators(), start
+    return equations.with_parameters(start.parameters), start
 
 
-def estimator_at(
-    equations: Equations, exact: Equations, start: Evaluation, loss: LossName
-) -> Estimator:
-    """The estimator at its start.
+def estimator_at(equations: Equations, start: Evaluation, loss: LossName) -> Estimator:
+    """The estimator at its start, which is that with exact actuators.
 
     Raises
     ------
     ValueError
         Rows that were not reached.
     """
-    if not start.ok and exact is equations:
-        raise FitError(exact.failures(start))
+    if not start.ok and not equations.machines.unknowns:
+        raise FitError(equations.failures(start))
     equations, own = equations.begin(start)
     if not own.ok:
         raise FitError(equations.failures(own))
-    return Estimator(equations, own, loss)
+    return Estimator.of(equations, own, loss)

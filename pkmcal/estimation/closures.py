@@ -1,18 +1,17 @@
-"""Closures by pose: the pose follows from the actuators exactly, nearly, or not alone.
+"""Closures of poses that have unknowns: these follow from the actuators nearly, or not alone.
 
 An estimator that gives every row a pose of its own needs three things of a machine: unknowns of the
 pose, equations between them and what the actuators read, and how the pose moves with the unknowns
-and with the numbers of the geometry. There are three cases:
+and with the numbers of the geometry. There are two cases beside that of as many closures as free
+coordinates and actuators without error, where the pose is that of the forward kinematics:
 
-* `ExactActuators`: as many closures as free coordinates, actuators without error. No unknowns: the
-  pose is that of the forward kinematics.
 * `NoisyActuators`: the same closures, actuators with a stated deviation. The unknowns are where the
   actuators really are; closures hold exactly, for the pose is that of the forward kinematics there.
 * `FreePoses`: more actuators than ways to move, whose closures no pose can meet at once. The
   unknowns are the coordinates that joints leave free; each closure that is read is an equation in
   units of its actuator.
 
-Closures beyond the free coordinates do not make the third case by themselves. An over-constrained
+Closures beyond the free coordinates do not make the second case by themselves. An over-constrained
 machine has them between passive joints, which read nothing: with errors of the geometry they give
 way, and the pose that misses them least is that of the forward kinematics. To take what they miss
 for noise would make small whatever geometry lets them agree.
@@ -70,49 +69,6 @@ class Closures(Protocol):
         """Compute twists by numbers while the unknowns are held, (K, 6, p); None without any."""
 
 
-class ExactActuators:
-    """Poses that follow from what the actuators read."""
-
-    unknowns = equations = cells = 0
-    actuators: tuple[int, ...] = ()
-    missing: BoolArray | None = None
-
-    def __init__(self, read: FloatArray) -> None:
-        self.read = read
-        self.sigma: FloatArray | None = None
-
-    def settled(self, robot: Calibratable, states: RowStates) -> RowStates:
-        """Solve the forward kinematics."""
-        solved = robot.forward(self.read, states.pose)
-        return RowStates(solved.pose, self.read, solved.status)
-
-    def moved(self, robot: Calibratable, states: RowStates, step: FloatArray) -> RowStates:
-        """Return the poses as they are: nothing moves them."""
-        return states
-
-    def residual(self, robot: Calibratable, states: RowStates) -> tuple[FloatArray, FloatArray]:
-        """Return no equations: actuators are exact."""
-        return np.empty((len(self.read), 0)), np.empty((len(self.read), 0, 0))
-
-    def lengths(self, robot: Calibratable) -> FloatArray:
-        """Return no equations: actuators are exact."""
-        return np.empty(0)
-
-    def twists(self, robot: Calibratable, states: RowStates) -> FloatArray:
-        """Return no unknowns: actuators are exact."""
-        return np.empty((len(self.read), 6, 0))
-
-    def by_numbers(self, robot: Calibratable, states: RowStates, places: IntArray) -> FloatArray:
-        """Return no equations: actuators are exact."""
-        return np.empty((len(self.read), 0, len(places)))
-
-    def twists_by_numbers(
-        self, robot: Calibratable, states: RowStates, places: IntArray
-    ) -> FloatArray | None:
-        """Twists, actuators held."""
-        return robot.error_twists(states.pose, states.actuators).take(places, axis=2)
-
-
 class NoisyActuators:
     """Poses that follow from where the actuators are, which is near what they read.
 
@@ -137,8 +93,7 @@ class NoisyActuators:
 
     def settled(self, robot: Calibratable, states: RowStates) -> RowStates:
         """Solve the forward kinematics where the actuators are."""
-        solved = robot.forward(states.actuators, states.pose)
-        return RowStates(solved.pose, states.actuators, solved.status)
+        return following(robot, states.actuators, states.pose)
 
     def moved(self, robot: Calibratable, states: RowStates, step: FloatArray) -> RowStates:
         """Move the actuators."""
@@ -341,6 +296,12 @@ class FreePoses:
         return RowStates(pose, self.read, found, states.tension)
 
 
+def following(robot: Calibratable, actuators: FloatArray, guess: FloatArray) -> RowStates:
+    """States whose poses follow from where the actuators are (K, n)."""
+    solved = robot.forward(actuators, guess)
+    return RowStates(solved.pose, actuators, solved.status)
+
+
 def machine_of(robot: Calibratable) -> Robot:
     """The parallel machine that rows with poses of their own are of."""
     found = as_parallel(robot)
@@ -363,8 +324,8 @@ def has_equations(
 
 def closures_of(
     robot: Calibratable, read: FloatArray, sigma: FloatArray | None, estimated: bool
-) -> ExactActuators | NoisyActuators | FreePoses:
-    """Make the closures of a machine for the actuator readings (K, n).
+) -> NoisyActuators | FreePoses | None:
+    """Make the closures of a machine for the actuator readings (K, n); None of exact ones.
 
     Parameters
     ----------
@@ -383,5 +344,5 @@ def closures_of(
     if pose_steps.surplus(robot) > 0:
         return FreePoses(machine_of(robot), read, one_mm(robot, read) if sigma is None else sigma)
     if sigma is None or not has_equations(robot, [sigma], estimated):
-        return ExactActuators(read)
+        return None
     return NoisyActuators(read, sigma)

@@ -8,7 +8,6 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.estimation.equations import Equations
-from pkmcal.estimation.labels import Labels
 from pkmcal.statistics.covariance import Covariance
 from pkmcal.statistics.linear_fit import LinearFit
 from pkmcal.statistics.steps import deviation, smallest_gaps, step_of
@@ -53,29 +52,25 @@ class Coarse:
 
 def coarse_readings(
     equations: Equations,
-    named: Labels,
-    component: IntArray,
     fit: LinearFit,
     factors: FloatArray,
     covariance: Covariance,
 ) -> tuple[Coarse, ...]:
-    """Find them, for noise factors (G,); none of mixtures of readings and closures.
-
-    `component` (M,) is `component_of` the equations.
-    """
+    """Find them, for noise factors (G,); none of mixtures of readings and closures."""
     if equations.machines.unknowns:
         return ()
-    variances = equations.whitening.variances(factors)
+    component = component_of(equations)
+    variances, retained = equations.whitening.variances(factors), 1.0 - fit.leverage()
     found = []
     for i, measured in enumerate(equations.table.sets):
         values = measured.values.reshape(len(measured), -1)
         gaps = smallest_gaps(values)
         for k, unit in enumerate(measured.units):
-            mine = (named.set_of == i) & (component == k)
+            mine = (equations.blocks.set_of == i) & (component == k)
             if not mine.any():
                 continue
             weighted = float(variances[mine].mean())
-            freedom = float((1.0 - fit.leverage[mine]).sum())
+            freedom = float(retained[mine].sum())
             squares = float((fit.residual[mine] ** 2 * variances[mine]).sum())
             residual = float(np.sqrt(squares / freedom)) if freedom > 0 else float("nan")
             used = covariance.scale * weighted**0.5

@@ -15,7 +15,6 @@ import numpy as np
 from pkmcal.arrays import FloatArray
 from pkmcal.estimation.coarse_readings import Coarse, component_of
 from pkmcal.estimation.equations import Equations
-from pkmcal.estimation.labels import Labels
 from pkmcal.statistics.linear_fit import LinearFit
 from pkmcal.statistics.score_test import columns_of, score_test
 
@@ -71,7 +70,6 @@ class Cut:
 
 def cut_readings(
     equations: Equations,
-    named: Labels,
     fit: LinearFit,
     factors: FloatArray,
     coarse: Sequence[Coarse],
@@ -93,7 +91,8 @@ def cut_readings(
             parts = [np.zeros((len(m), len(m.components))) for m in equations.table.sets]
             parts[i] = offset
             column = equations.whitening.whitened(parts, factors)
-            used = (named.set_of == i) & np.isin(component, [each.component for each in mine])
+            of_set = equations.blocks.set_of == i
+            used = of_set & np.isin(component, [each.component for each in mine])
             column[~used] = 0.0
             score = score_test(fit, columns_of(column[:, None]))
             size, deviation, chance = (

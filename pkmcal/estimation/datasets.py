@@ -16,12 +16,14 @@ from pkmcal.estimation.parameters import KNOWN, Known
 from pkmcal.estimation.pose_table import tells_actuators
 from pkmcal.estimation.runs import runs_apart
 from pkmcal.estimation.sessions import in_sessions, set_names
+from pkmcal.estimation.shapes import require_members
 from pkmcal.estimation.starts import with_starts
 from pkmcal.estimation.tensioned_poses import unknown_tensions
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.kinematics.pose_steps import surplus
 from pkmcal.measurements.measurements import Measurements
+from pkmcal.readings.reading import Reading
 
 Said = Mapping[str, Known | Sequence[Known]]  # of "frame", "target" and "attachment"
 
@@ -42,6 +44,7 @@ def as_fit_data(
         _check(robot, measured, "measurements")
     if not sets:
         raise ArgumentError("measurements: none given")
+    _require_one_class(sets)
     sets = runs_apart(sets)
     if sessions:
         sets = in_sessions(sets)
@@ -56,26 +59,32 @@ def as_fit_data(
     if any(known) and not all(known):
         raise ArgumentError("measurements: state actuator_sigma of all sets, or of none")
     if any(data.unknown_frame for data in datasets) and not any(data.framed for data in datasets):
-        raise ArgumentError("frame: distances do not depend on it, it cannot be unknown")
+        raise ArgumentError(f"frame: {_of_kinds(sets)} do not depend on it, it cannot be unknown")
     _require_one_frame(datasets)
-    distances = any(data.measured.instrument.point == "base" for data in datasets)
-    if any(data.unknown_attachment for data in datasets) and not distances:
-        raise ArgumentError("attachment: distances alone have one, it cannot be unknown")
+    attached = any(data.measured.instrument.unknown_with_attachment for data in datasets)
+    if any(data.unknown_attachment for data in datasets) and not attached:
+        raise ArgumentError(f"attachment: {_of_kinds(sets)} have none, it cannot be unknown")
     return with_starts(robot, datasets)
+
+
+def _of_kinds(sets: Sequence[Measurements]) -> str:
+    """What was measured, in words."""
+    return " and ".join(dict.fromkeys(measured.instrument.noun() for measured in sets))
 
 
 def _require_one_frame(datasets: Sequence[FitData]) -> None:
     """Refuse readings of different things that would share a frame."""
-    stands = dict[tuple[str, str], str]()
+    first = dict[tuple[str, str], Reading]()
     for data in datasets:
         if data.frame is None:
             continue
-        own = data.measured.instrument.stands_by
-        if stands.setdefault(data.frame, own) != own:
-            one, other = (each or "another instrument" for each in (stands[data.frame], own))
+        mine = data.measured.instrument
+        two = (first.setdefault(data.frame, mine), mine)
+        if two[0].stands_by != mine.stands_by:
+            one, other = (each.stands_by or "another instrument" for each in two)
+            cure = next(filter(None, (each.told_apart_by for each in two)), "state frame_name")
             raise ArgumentError(
-                f"measurements: {one} and {other} stand each in a place of its own: name the"
-                " camera, or the board that stands (camera_name, board_name)"
+                f"measurements: {one} and {other} stand each in a place of its own: {cure}"
             )
 
 
@@ -107,8 +116,8 @@ def informative(machine: Calibratable, datasets: list[FitData]) -> tuple[list[Fi
     if not kept:
         raise ArgumentError(
             f"measurements: nothing was read but the actuators; poses of {machine.name} follow from"
-            " these, which then say nothing of its geometry: measure poses, points, heights or"
-            " distances"
+            " these, which then say nothing of its geometry: measure where its platform is, or how"
+            " far from something"
         )
     return kept, unread
 
@@ -140,20 +149,39 @@ def as_fitted(
     return with_starts(robot, [data])[0], i
 
 
-def by_set(said: Said) -> frozenset[str]:
+def roles_of(datasets: Sequence[FitData]) -> tuple[str, ...]:
+    """The roles of what some readings depend on that `identify` may be told to find."""
+    words = ("frame", "target", "attachment")
+    return tuple(dict.fromkeys(r for data in datasets for word in words for r in data.roles(word)))
+
+
+def by_set(said: Said, datasets: Sequence[FitData]) -> frozenset[str]:
     """Return the roles that are unknown in several sets, apart for each."""
-    each = {name: given for name, given in said.items() if not isinstance(given, str)}
-    found = {
+    apart = [
         name
-        for name, given in each.items()
-        if isinstance(given, Iterable) and list(given).count("unknown") > 1
-    }
-    of_target = {"anchor", "tool", "mounting"} if "target" in found else set()
-    return frozenset(found | of_target)
+        for name, given in said.items()
+        if not isinstance(given, str)
+        and isinstance(given, Iterable)
+        and list(given).count("unknown") > 1
+    ]
+    return frozenset(role for name in apart for data in datasets for role in data.roles(name))
+
+
+def _require_one_class(sets: Sequence[Measurements]) -> None:
+    """Refuse readings of two classes that have one name, by which they would be taken for alike."""
+    found = dict[str, type]()
+    for of in (type(measured.instrument) for measured in sets):
+        if (other := found.setdefault(of.name, of)) is not of:
+            classes = " and ".join(f"{each.__module__}.{each.__qualname__}" for each in (other, of))
+            raise ArgumentError(
+                f"measurements: the classes {classes} have one name, {of.name!r}, and are no one"
+                " kind of reading; give one of them another name"
+            )
 
 
 def _check(robot: Calibratable, measured: Measurements, argument: str) -> None:
     n = instance(argument, measured, Measurements).actuators.shape[1]
+    require_members(measured, robot.length)
     if n != robot.n_actuators:
         raise ArgumentError(
             f"{argument}: {robot.name} has {robot.n_actuators} actuators, found {n} per row"

@@ -1,7 +1,7 @@
 """The equations of a calibration: measured less predicted, whitened, and their Jacobian.
 
 What the estimator works on are `Equations.residual` (M,) and `Equations.by_parameters` (M, n): the
-reduced equations, of which every pose has taken those that determine it (`elimination`). On a
+reduced equations, of which every pose has taken those that determine it (`pose_system`). On a
 machine whose poses follow exactly from its actuators no pose takes any, and they are the readings
 themselves, set by set and row by row.
 """
@@ -17,13 +17,13 @@ import numpy as np
 from pkmcal.arrays import BoolArray, FloatArray
 from pkmcal.core.library import STATUS
 from pkmcal.estimation.compression import compressed
-from pkmcal.estimation.elimination import Shares
+from pkmcal.estimation.derivatives import derivatives, jacobian
 from pkmcal.estimation.evaluation import Cache, Evaluation
 from pkmcal.estimation.first_frames import aligned
 from pkmcal.estimation.first_unknowns import fitted_together
-from pkmcal.estimation.fit_data import FitData
+from pkmcal.estimation.fit_data import FitData, refuse_free_poses
 from pkmcal.estimation.parameters import Parameters
-from pkmcal.estimation.pose_system import PoseSystem
+from pkmcal.estimation.pose_system import PoseSystem, Shares
 from pkmcal.estimation.pose_table import PoseTable
 from pkmcal.estimation.prediction import Prediction
 from pkmcal.estimation.row_blocks import PoseBlocks, RowBlocks, pose_blocks, row_blocks
@@ -82,7 +82,7 @@ class Equations:
         equations = cls(missing, prediction, whitening, machines, blocks, table.actuators)
         if not machines.unknowns:
             return equations
-        prediction.refuse_free_poses()
+        refuse_free_poses(datasets, robot)
         whitening = whitening.by_family(table.sets)
         cells = table.cells
         of_cells = [cells is not None and cells.sigma is None] if machines.cells else []
@@ -109,9 +109,12 @@ class Equations:
 
     @cached_property
     def mm(self) -> tuple[FloatArray, ...]:
-        """One unit of each component of each set in mm, (k,) or (N, k)."""
+        """One unit of each component of each row of each set in mm, (N, k)."""
         length = self.parameters.robot.length
-        return tuple(m.instrument.mm(m, length) for m in self.table.sets)
+        return tuple(
+            np.broadcast_to(m.instrument.mm(m, length), (len(m), len(m.components)))
+            for m in self.table.sets
+        )
 
     @property
     def size(self) -> float:
@@ -292,7 +295,10 @@ class Equations:
         are. Rows that fail from a measured pose are tried from home. `near` (n,) are other
         parameters to start from, of which only `own` (n,) are aligned.
         """
-        theta = self.parameters.start.copy() if near is None else near.copy()
+        unlaid, theta = self.parameters.unlaid(self.parameters.start if near is None else near, own)
+        if unlaid is not self.parameters:
+            return self.with_parameters(unlaid).start(theta, own, states)
+        theta = theta.copy()
         states = self.prediction.guess if states is None else states
         evaluation = self.at(theta, near=states)
         if not evaluation.ok:
@@ -338,8 +344,7 @@ class Equations:
         p = self.parameters
         columns = self.table.machine_columns
         robots = [p.robot.with_values(p.values_at(theta, own)) for own in columns]
-        m = self.machines
-        return Machines(tuple(robots), m.rows, m.closures, m.state, m.shift)
+        return replace(self.machines, robots=tuple(robots))
 
     def _begun(self, near: Near) -> RowStates:
         if near is None:
@@ -384,7 +389,7 @@ class Equations:
             yield slice(0, len(self.blocks.components)), slice(0, len(found)), found
             return
         blocks = equations = slice(0, 0)
-        for batch, parts in self.prediction.derivatives(evaluation):
+        for batch, parts in derivatives(self.prediction, evaluation):
             white = [self.whitening.whiten_rows(part, i, rows, noise) for i, rows, part in parts]
             whole = white[0] if len(white) == 1 else np.concatenate(white)
             read = int(np.count_nonzero(self.table.count[batch]))
@@ -394,7 +399,7 @@ class Equations:
 
     def jacobian(self, evaluation: Evaluation) -> list[FloatArray]:
         """Derivative of the predicted values of each set to the parameters, (N, k, n)."""
-        return self.prediction.jacobian(evaluation)
+        return jacobian(self.prediction, evaluation)
 
     def by_groups(
         self,

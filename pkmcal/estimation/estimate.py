@@ -7,16 +7,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pkmcal.arrays import FloatArray
-from pkmcal.estimation.elimination import Shares
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.identifiability import Decomposed, Directions
-from pkmcal.estimation.loss import Loss
+from pkmcal.estimation.loss import LossName
+from pkmcal.estimation.pose_system import Shares
+from pkmcal.result import ReadOnly
 
 LEAST_NOISE = 1e-9  # mm; what is left of measurements without noise
 
 
 @dataclass(frozen=True, eq=False)
-class IterationState:
+class IterationState(ReadOnly):
     """Fixed quantities of one least-squares solve, revised before the next.
 
     Attributes
@@ -25,8 +26,10 @@ class IterationState:
         Factor on the stated deviations of each group of equations (the sets; where poses have
         unknowns the lengths and angles of each, then the actuators); where none is stated, the
         deviation in mm, of angles that of their arc.
-    loss : Loss
+    loss : {"linear", "huber", "cauchy"}
         How rows count.
+    width : ndarray (B,)
+        Factor on the limit of the loss of each block: see `loss.limits`.
     measured : Directions
         Identifiable from the measurements alone.
     determined : Directions
@@ -45,7 +48,8 @@ class IterationState:
     """
 
     noise: FloatArray
-    loss: Loss
+    loss: LossName
+    width: FloatArray
     measured: Directions
     determined: Directions
     fitted: Directions
@@ -56,7 +60,7 @@ class IterationState:
 
 
 @dataclass(frozen=True, eq=False)
-class Estimate:
+class Estimate(ReadOnly):
     """The equations and their statistics at the solution.
 
     All of it is of the M equations that are left when poses have taken their part: noise is 1 in
@@ -85,9 +89,9 @@ class Estimate:
         Scaled combinations at right angles to each other: those of `half`, and those that are not
         determined.
     shares : Shares
-        Of each group, the sum of squared residuals and what it says of the noise: `elimination`.
+        Of each group, the sum of squared residuals and what it says of the noise: `pose_system`.
     converged, evaluations, history
-        Those of the search, `Trail`.
+        Those of the `Estimator`.
     """
 
     evaluation: Evaluation

@@ -7,12 +7,13 @@ from functools import cached_property
 from typing import TypedDict
 
 from pkmcal.arrays import FloatArray, Int32Array
-from pkmcal.estimation.elimination import System
 from pkmcal.estimation.parameters import Parameters
+from pkmcal.estimation.pose_search import System
 from pkmcal.estimation.row_states import RowStates
 from pkmcal.estimation.session_machines import Machines
 from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.readings.predicted import Predicted
+from pkmcal.result import ReadOnly
 
 
 class Cache(TypedDict, total=False):
@@ -29,7 +30,7 @@ class Cache(TypedDict, total=False):
 
 
 @dataclass(frozen=True, eq=False)
-class Evaluation:
+class Evaluation(ReadOnly):
     """The equations evaluated at one parameter vector.
 
     Attributes

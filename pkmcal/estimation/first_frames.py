@@ -1,11 +1,13 @@
-"""Start of the search for unknown frames, targets, tools: see `alignment` and `hand_eye`.
+"""Start of the search for unknown frames, points and what is carried: see `alignment`, `hand_eye`.
 
-Targets in known frames follow from the poses. Then frame by frame; what several frames have in
-common is placed with the first of them. Frames in which points were read come first, then tools,
-with their frame where it is not laid yet.
+Points in known frames follow from the poses. Then frame by frame; what several frames have in
+common is placed with the first of them. Frames in which points were read come first, then what the
+platform carries, with its frame where that is not laid yet.
 """
 
 from __future__ import annotations
+
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -15,9 +17,11 @@ from pkmcal.core.poses import compose, invert
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.parameters import Parameters
 from pkmcal.estimation.prediction import Prediction
+from pkmcal.exceptions import ArgumentError
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.readings.alignment import Sighting
 from pkmcal.readings.hand_eye import of_frame_and_tool, of_tool
+from pkmcal.readings.predicted import require_shape
 
 Rows = dict[int, IntArray]  # of a frame, in each set
 
@@ -38,18 +42,18 @@ def aligned(
     """
     parameters, theta = prediction.parameters, evaluation.theta.copy()
     free = ~parameters.uncertain if own is None else own & ~parameters.uncertain
-    frames, tools = prediction.frames, prediction.tools
+    frames, things = prediction.frames, prediction.carried_things
     _with_known_frame(prediction, evaluation, theta, free)
     by_points = [
         first
         for first, rows in frames.items()
         if any(_gives_points(prediction.table.sets[i]) for i in rows)
     ]
-    for first in dict.fromkeys([*by_points, *tools, *frames]):
+    for first in dict.fromkeys([*by_points, *things, *frames]):
         if not free[first]:
             continue
-        if first in tools:
-            laid = _with_tool(prediction, evaluation, first, parameters, theta, free)
+        if first in things:
+            laid = _with_carried(prediction, evaluation, first, parameters, theta, free)
         else:
             laid = {first: _aligned(prediction, evaluation, frames[first], parameters, theta, free)}
         for each, motion in laid.items():
@@ -98,17 +102,17 @@ def _shift(
     free[mine] = False
 
 
-def _with_tool(
+def _with_carried(
     prediction: Prediction,
     evaluation: Evaluation,
-    tool: int,
+    thing: int,
     parameters: Parameters,
     theta: FloatArray,
     free: BoolArray,
 ) -> dict[int, FloatArray]:
-    """A tool (6,) by its first parameter, with the frame it was measured in where that is free."""
+    """A carried pose (6,) by its first parameter, and the frame of its readings if free."""
     groups: dict[int | None, list[tuple[int, IntArray]]] = {}
-    for i, rows in prediction.tools[tool].items():
+    for i, rows in prediction.carried_things[thing].items():
         framed = {f: own[i] for f, own in prediction.frames.items() if i in own}
         if not framed:
             groups.setdefault(None, []).append((i, rows))
@@ -123,16 +127,16 @@ def _with_tool(
         parts.append((m.instrument.places_seen(m, at)[rows], at[rows]))
     values, pose = (np.concatenate(each) for each in zip(*parts, strict=True))
     if frame is None:
-        return {tool: of_tool(values, pose)}
+        return {thing: of_tool(values, pose)}
     if free[frame]:
         base, carried = of_frame_and_tool(values, pose)
-        return {frame: base, tool: carried}
+        return {frame: base, thing: carried}
     base = _motion(parameters, theta, frame)
-    return {tool: of_tool(compose(invert(base), np.ascontiguousarray(values)), pose)}
+    return {thing: of_tool(compose(invert(base), np.ascontiguousarray(values)), pose)}
 
 
 def _motion(parameters: Parameters, theta: FloatArray, first: int) -> FloatArray:
-    """A frame or tool (6,) by its first parameter."""
+    """A frame or carried pose (6,) by its first parameter."""
     near = np.ascontiguousarray(theta[None, first : first + 6])
     motion: FloatArray = compose(parameters.origin[first], near)[0]
     return motion
@@ -146,8 +150,8 @@ def _seen(
     parameters: Parameters,
     theta: FloatArray,
 ) -> FloatArray:
-    """Return readings of set `i` in the base frame, (N, k), with tools that are aligned."""
-    columns = prediction.columns[i].get("tool")
+    """Return readings of set `i` in the base frame, (N, k), with carried poses that are aligned."""
+    columns = prediction.carried_columns(i)
     if columns is None:
         return prediction.values(evaluation)[i][rows]
     pose = evaluation.pose[prediction.table.pose_of[i][rows]]
@@ -158,9 +162,9 @@ def _seen(
 
 
 def _read(prediction: Prediction, evaluation: Evaluation, i: int, rows: IntArray) -> FloatArray:
-    """Values (N, k) of rows of set `i`; of readings that depend on a tool its pose."""
+    """Values (N, k) of rows of set `i`; of readings of something carried its pose."""
     m = prediction.table.sets[i]
-    if "tool" not in prediction.columns[i]:
+    if prediction.carried_columns(i) is None:
         return m.values[rows]
     at = evaluation.pose[prediction.table.pose_of[i]]
     seen: FloatArray = m.instrument.places_seen(m, at)[rows]
@@ -182,7 +186,7 @@ def _aligned(
     columns = [_free_targets(prediction, i, rows[i], free) for i in mine]
     parts = [_points(prediction, evaluation, i, rows[i], theta) for i in mine]
     places, turns = (np.concatenate(each) for each in zip(*parts, strict=True))
-    frame, shifts = instrument.frame(
+    laid = instrument.frame(
         Sighting(
             values=np.concatenate([_read(prediction, evaluation, i, rows[i]) for i in mine]),
             predicted=np.concatenate(
@@ -193,6 +197,11 @@ def _aligned(
             target=np.concatenate(columns)[:, 0],
         )
     )
+    what = f"kind: frame of the class {type(instrument).__name__}"
+    if len(laid) != 2 or not isinstance(laid[1], Mapping):
+        raise ArgumentError(f"{what} must return a frame and a mapping of shifts; found {laid}")
+    frame, shifts = laid
+    require_shape(f"{what}: the frame", frame, (6,))
     for first, shift in shifts.items():
         _shift(prediction, theta, free, first, shift)
     return frame
@@ -200,11 +209,16 @@ def _aligned(
 
 def _free_targets(prediction: Prediction, i: int, rows: IntArray, free: BoolArray) -> IntArray:
     """Parameters (N, 3) of the target of each row of set `i`; -1 where it is not free."""
-    columns = prediction.columns[i].get("target")
+    columns = prediction.columns[i].get(_point(prediction, i))
     if columns is None:
         return np.full((len(rows), 3), -1)
     mine = columns[rows]
     return np.where(free[mine], mine, -1)
+
+
+def _point(prediction: Prediction, i: int) -> str:
+    """The argument of set `i` that is the point of the platform that was read; "" of others."""
+    return next(iter(prediction.points[i]), "")
 
 
 def _points(
@@ -215,7 +229,7 @@ def _points(
     Of readings without targets, the platform.
     """
     pose = evaluation.pose[prediction.table.pose_of[i][rows]]
-    target = prediction.arguments_of(i, theta).get("target")
+    target = prediction.arguments_of(i, theta).get(_point(prediction, i))
     own = np.zeros((len(rows), 3)) if target is None else np.ascontiguousarray(target[rows])
     places, _, turn = instruments.points(pose, own)
     return places, turn

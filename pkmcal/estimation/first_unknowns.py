@@ -17,6 +17,7 @@ from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.prediction import Prediction
 from pkmcal.estimation.sessions import NONE
 from pkmcal.readings.alignment import inverse_above
+from pkmcal.readings.dependences import yielded
 from pkmcal.readings.predicted import Predicted
 
 _GROSS = 6.0  # times the median misfit of its set, beyond which a row counts by its length alone
@@ -44,8 +45,8 @@ def fitted_together(
         What was read, and should be.
     evaluation : Evaluation
         Where the machine is, which is held, and where the unknowns are so far.
-    mm : sequence of ndarray (k,) or (N, k)
-        One unit of each component of each set in mm, in which misfits are said.
+    mm : sequence of ndarray (N, k)
+        One unit of each component of each row of each set in mm, in which misfits are said.
     own : ndarray of bool (n,), optional
         Which parameters may be changed; by default all that are not known but for an uncertainty.
     """
@@ -98,9 +99,7 @@ def _unknowns(prediction: Prediction, own: BoolArray | None) -> IntArray:
 def _of_readings(prediction: Prediction, i: int) -> dict[str, IntArray]:
     """Parameters (N, w) of the arguments of the readings of set `i`, without those of effects."""
     data = prediction.datasets[i]
-    beside = {
-        each.argument for effect in data.effects for each in effect.dependences(data.measured)
-    }
+    beside = {each.argument for effect in data.effects for each in yielded(effect, data.measured)}
     return {name: own for name, own in prediction.columns[i].items() if name not in beside}
 
 

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
-
-import numpy as np
 
 from pkmcal.arrays import BoolArray, IntArray
 from pkmcal.effects.effect import Effect
 from pkmcal.exceptions import ArgumentError
+from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.readings.unknowns import PLACE, Dependence, Numbers, Start, points_of, yielded
+from pkmcal.readings.dependences import points_of, yielded
+from pkmcal.readings.unknowns import PLACE, Dependence, Numbers, Start
 
 FRAME = "frame"  # the role of frames
 
@@ -52,6 +52,16 @@ class FitData:
         """Return the data of some of the rows."""
         return replace(self, measured=self.measured.select(chosen), rows=self.rows[chosen])
 
+    def roles(self, unknown: str) -> tuple[str, ...]:
+        """The roles of what is unknown of these rows if a word of `identify` says so."""
+        instrument = self.measured.instrument
+        found: dict[str, tuple[str, ...]] = {
+            FRAME: (FRAME,),
+            "target": instrument.unknown_with_target,
+            "attachment": instrument.unknown_with_attachment,
+        }
+        return found[unknown]
+
     @property
     def framed(self) -> bool:
         """True if these readings depend on the unknown frame."""
@@ -65,11 +75,9 @@ class FitData:
 
     @property
     def axis(self) -> IntArray | None:
-        """The artefact's own axis in each row, (N,), of touched lines and planes."""
-        touched = getattr(self.measured.instrument, "touched", None)
-        if touched is None:
-            return None
-        return np.array([self.starts["touch", name].axis for name in touched.tolist()])
+        """The axis (N,) of its own from which each row's thing counts; None where none does."""
+        found: IntArray | None = self.measured.instrument.axis(self)
+        return found
 
     def dependences(self) -> Iterator[Dependence]:
         """Return the dependences of the readings beside pose and frame.
@@ -80,9 +88,14 @@ class FitData:
             A dependence that does not have one entry for each row.
         """
         instrument = self.measured.instrument
-        own = yielded(instrument, instrument.dependences(self))
-        of_effects = (yielded(each, each.dependences(self.measured)) for each in self.effects)
-        for each in (*own, *chain.from_iterable(of_effects)):
+        own = yielded(instrument, self)
+        of_effects = [*chain.from_iterable(yielded(each, self.measured) for each in self.effects)]
+        for each in of_effects:
+            if each.nature.body:
+                raise ArgumentError(
+                    f"effects: {each.argument}: a place on the {each.nature.body} is of a reading"
+                )
+        for each in (*own, *of_effects):
             if not len(each.index) == len(each.given) == len(self.measured):
                 raise ArgumentError(
                     f"{each.argument}: the dependence on it has {len(each.index)} names and"
@@ -90,3 +103,23 @@ class FitData:
                     f" {len(self.measured)} rows"
                 )
             yield each
+
+
+def refuse_free_poses(datasets: Sequence[FitData], robot: Calibratable) -> None:
+    """Refuse what needs exact actuators, where poses have unknowns.
+
+    Those are effects, and readings of joints and between poses.
+    """
+    effects = [effect.name for data in datasets for effect in data.effects]
+    if effects:
+        names = ", ".join(dict.fromkeys(effects))
+        raise ArgumentError(
+            f"{names}: needs poses that follow from the actuators: no actuator_sigma, and"
+            " no surplus actuators; found others"
+        )
+    for m in (data.measured for data in datasets):
+        if not m.instrument.follows_pose(robot):
+            raise ArgumentError(
+                f"measurements: readings of kind {m.kind!r} need poses that follow from the"
+                " actuators: no actuator_sigma, and no surplus actuators"
+            )

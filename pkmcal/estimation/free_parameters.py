@@ -29,7 +29,9 @@ from pkmcal.estimation.sessions import Scope, label, scopes
 from pkmcal.estimation.uncertain_numbers import own_deviations, spread, uncertain_names
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.calibratable import Calibratable
+from pkmcal.readings.unknowns import Nature
 
+Key = tuple[str, str]  # role and name of what is found beside the geometry
 _EXACT = 1e-7  # mm that a number moves the machine by: what is stated to be less is exact as well
 
 
@@ -58,7 +60,8 @@ def parameters(
     free, along = _free_names(robot, asked)
     known = geometry.names
     places = np.array([known.index(name) for name in (*free, *along)], dtype=np.intp)
-    beside = _beside_geometry(datasets) | _of_residuals(asked.residuals, geometry.names)
+    beside, natures = _beside_geometry(datasets)
+    beside |= _of_residuals(asked.residuals, geometry.names)
     ends = np.cumsum([len(places), *(len(each.names) for each in beside.values())]).tolist()
     blocks = dict(zip(beside, map(slice, ends, ends[1:]), strict=False))
     numbers = [known[i] for i in places.tolist()]
@@ -72,7 +75,9 @@ def parameters(
             fitted_along |= {*range(block.start, block.stop)}
         if beside[point].spread is not None:
             beside_known |= {*range(block.start, block.stop)}
-    entries = _without_exact(entries, numbers, fitted_along - beside_known, asked)
+    poses = [blocks[key] for key, nature in natures.items() if nature.pose]
+    whole = {number for block in poses for number in range(block.start, block.stop)}
+    entries = _without_exact(entries, numbers, fitted_along - beside_known, asked, whole)
     fitted_along |= beside_known
     number_of = np.array([number for number, _ in entries], dtype=np.intp)
     names = tuple(numbers[j] + (f"@{behind}" if behind else "") for j, behind in entries)
@@ -119,6 +124,7 @@ def parameters(
         sessions=_sessions(datasets) if "session" in scope else (),
         places=places,
         nuisance={key: block.start for key, block in blocks.items()},
+        natures=natures,
         origin={},
         robot=robot,
         asked=asked,
@@ -134,7 +140,8 @@ def parameters(
         return made
     start = dict(zip(names, zip(values.tolist(), units, strict=True), strict=True))
     columns = {session: made.geometry_of(session) for session in made.sessions or ("",)}
-    given = (asked.prior, robot, start, places, columns)
+    moved = {names[first + k] for first in made.motions for k in range(len(PLACE))}
+    given = (asked.prior, robot, start, places, columns, moved)
     return replace(made, functions=prior_functions(*given, strict=like is None))
 
 
@@ -221,14 +228,18 @@ def _without_exact(
     numbers: Sequence[str],
     fitted_along: set[int],
     asked: Asked,
+    whole: set[int],
 ) -> list[tuple[int, str]]:
-    """Parameters without those numbers of frames and points of which no uncertainty is stated."""
+    """Parameters without those numbers of frames and points of which no uncertainty is stated.
+
+    Numbers in `whole` are of poses, of which all six are stated or none.
+    """
     kept = []
     for number, behind in entries:
         name = numbers[number] + (f"@{behind}" if behind else "")
         if number not in fitted_along or spread(asked.uncertainty, [name])[0, 0] > 0.0:
             kept.append((number, behind))
-        elif name.startswith(("frame.", "tool.")):
+        elif number in whole:
             raise ArgumentError(
                 f"uncertainty: {name} has none, and other numbers of {name.partition('.')[0]} have"
                 " one: state all six"
@@ -236,17 +247,25 @@ def _without_exact(
     return kept
 
 
-def _beside_geometry(datasets: Sequence[FitData]) -> dict[tuple[str, str], Numbers]:
-    """The numbers to be found beside the geometry, by role and name: frames come first."""
-    found: dict[tuple[str, str], Numbers] = {}
+def _beside_geometry(
+    datasets: Sequence[FitData],
+) -> tuple[dict[Key, Numbers], dict[Key, Nature]]:
+    """The numbers to be found beside the geometry, by role and name: frames come first.
+
+    And what they are.
+    """
+    found: dict[Key, Numbers] = {}
+    natures: dict[Key, Nature] = {}
     for frame in (data.frame for data in datasets):
         if frame is not None:
             whose = ".".join(filter(None, frame))
             names, units = zip(*((f"{whose}.{axis}", unit) for axis, unit in PLACE), strict=True)
             found[frame] = Numbers(names, units, np.arange(6), np.zeros(6))
+            natures[frame] = Nature(pose=True)
     for dependence in (each for data in datasets for each in data.dependences()):
         role = dependence.role
         for name, own in dependence.estimated.items():
+            natures.setdefault((role, name), dependence.nature)
             known = found.setdefault((role, name), own)
             if (known.names, known.units) != (own.names, own.units):
                 raise ArgumentError(
@@ -264,7 +283,7 @@ def _beside_geometry(datasets: Sequence[FitData]) -> dict[tuple[str, str], Numbe
                     f"{role}: {role} {name} starts at different places in different"
                     " measurements; give different targets different target_names"
                 )
-    return found
+    return found, natures
 
 
 def _of_residuals(

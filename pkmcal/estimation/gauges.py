@@ -149,12 +149,12 @@ def _tilts(robot: Robot, i: int) -> dict[str, FloatArray]:
 def _swivel_zeros(parameters: Parameters, robot: Robot) -> dict[int, FloatArray]:
     """Return derivatives of the zeros of swivel angles by the motions, by parameter."""
     found = {}
-    for i in robot.model.pulleys:
-        name = f"angle.swivel{i + 1}.zero"
-        for k, own in enumerate(parameters.names):
-            if own.partition("@")[0] == name:
+    pulleys = {f"swivel{i + 1}": i for i in robot.model.pulleys}
+    for key, nature in parameters.natures.items():
+        if nature.joint and key[1] in pulleys:
+            for k in np.flatnonzero(parameters.number_of == parameters.nuisance[key]).tolist():
                 found[k] = np.zeros(MOTIONS)
-                found[k][3:6] = _tilts(robot, i)["base"][2]
+                found[k][3:6] = _tilts(robot, pulleys[key[1]])["base"][2]
     return found
 
 

@@ -8,10 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from pkmcal.arguments import did_you_mean
 from pkmcal.effects.effect import Effect, EffectOfRows
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.sessions import matches
-from pkmcal.readings.unknowns import Dependence, Numbers, yielded
+from pkmcal.estimation.shapes import effect_of_rows
+from pkmcal.exceptions import ArgumentError
+from pkmcal.readings.dependences import yielded
+from pkmcal.readings.unknowns import Dependence, Numbers
 
 
 @dataclass(frozen=True)
@@ -36,11 +40,11 @@ class Held:
 
     def of_rows(self, measured: Any) -> EffectOfRows:
         """The effect in these rows."""
-        return self.effect.of_rows(measured)
+        return effect_of_rows(self.effect, measured)
 
     def dependences(self, measured: Any) -> Iterator[Dependence]:
         """Return the effect's coefficients, the held ones as fixed."""
-        for each in self.effect.dependences(measured):
+        for each in yielded(self.effect, measured):
             yield self._without_held(each)
 
     def _without_held(self, whole: Dependence) -> Dependence:
@@ -63,7 +67,7 @@ def coefficients(datasets: Sequence[FitData]) -> tuple[str, ...]:
             name
             for data in datasets
             for effect in data.effects
-            for dependence in yielded(effect, effect.dependences(data.measured))
+            for dependence in yielded(effect, data.measured)
             for numbers in dependence.estimated.values()
             for name in numbers.names
         )
@@ -79,15 +83,25 @@ def with_held(datasets: Sequence[FitData], patterns: tuple[str, ...]) -> list[Fi
 
 
 def of_the_machine(
-    patterns: Sequence[str], coefficients: Sequence[str], names: Sequence[str]
+    argument: str, patterns: Sequence[str], coefficients: Sequence[str], names: Sequence[str]
 ) -> tuple[str, ...]:
-    """Patterns without those that mean coefficients and none of the machine's numbers."""
-    return tuple(
-        each
-        for each in patterns
-        if any(matches(each, name) for name in names)
-        or not any(matches(each, name) for name in coefficients)
-    )
+    """Patterns without those that mean coefficients and none of the machine's numbers.
+
+    Raises
+    ------
+    ValueError
+        One that means neither, where there are coefficients.
+    """
+    found = []
+    for each in patterns:
+        if any(matches(each, name) for name in names) or not coefficients:
+            found.append(each)
+        elif not any(matches(each, name) for name in coefficients):
+            raise ArgumentError(
+                f"{argument}: no number of the geometry or of an effect matches {each!r}"
+                f"{did_you_mean(each, (*names, *coefficients))}"
+            )
+    return tuple(found)
 
 
 def _held(effect: Effect, data: FitData, patterns: tuple[str, ...]) -> Effect:

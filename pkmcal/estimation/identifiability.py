@@ -13,13 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, first_largest
+from pkmcal.result import ReadOnly
 from pkmcal.statistics.linear_fit import ROUNDING, few_rows
 from pkmcal.statistics.singular_values import svd
 
 _KINDS = 4  # kinds of parameters whose combinations are looked for
-# Nuisance parameters: one kind each, however many there are. A kind more is many combinations more.
-# Points that have names of their own are of it, too: targetA, targetB.
-_NUISANCE = re.compile(r"(frame|target|anchor|tool|mounting|touch|run)[^.]*\.")
 _OUTSIDE = 1e-5  # share of a combination outside some parameters that does not count
 _TOGETHER = 512  # supports that are looked at at once
 ALIKE = 1e-3  # share by which numbers of a combination differ that are as good as equal
@@ -30,7 +28,7 @@ CLEAR = 0.01  # share of the machine's size to which a combination must be deter
 
 
 @dataclass(frozen=True, eq=False)
-class Directions:
+class Directions(ReadOnly):
     """Orthonormal combinations of the parameters, split into identifiable and not.
 
     Attributes
@@ -193,15 +191,15 @@ def observability(jacobian: FloatArray, poses: int, rank: int) -> dict[str, floa
     }
 
 
-def sparse_basis(unidentifiable: FloatArray, names: Sequence[str]) -> FloatArray:
+def sparse_basis(unidentifiable: FloatArray, families: Sequence[str]) -> FloatArray:
     """Rewrite combinations so that each involves as few kinds of parameters as possible.
 
     Parameters
     ----------
     unidentifiable : ndarray (n, d)
         Orthonormal columns.
-    names : sequence of str, n
-        Of the parameters; ``base1.x`` and ``base2.x`` are of one kind.
+    families : sequence of str, n
+        Of the parameters, as `Parameters.families`: a kind more is many combinations more.
 
     Returns
     -------
@@ -211,7 +209,6 @@ def sparse_basis(unidentifiable: FloatArray, names: Sequence[str]) -> FloatArray
     d = unidentifiable.shape[1]
     if not d:
         return unidentifiable
-    families = [_family(name) for name in names]
     kinds = list(dict.fromkeys(families))
     member = np.array([[family == kind for kind in kinds] for family in families])
     found = np.zeros((d, 0))  # orthonormal combinations of the columns
@@ -280,13 +277,6 @@ def _pivots(basis: FloatArray) -> list[int]:
         along = rest[pivots[-1]] / sizes[pivots[-1]]
         rest -= np.outer(rest @ along, along)
     return pivots
-
-
-def _family(name: str) -> str:
-    """The kind of a parameter: its name without the limb, or what of the set-up it describes."""
-    name = name.partition("@")[0]
-    along = _NUISANCE.match(name)
-    return along[1] if along else re.sub(r"\d+", "", name)
 
 
 def as_sum(

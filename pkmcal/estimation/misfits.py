@@ -109,18 +109,17 @@ def rounding(equations: Equations, noise: FloatArray) -> float:
 def rounding_of_readings(equations: Equations, noise: FloatArray) -> FloatArray:
     """Whitened rounding errors (M,) of what is predicted of readings, for noise (G,)."""
     length = equations.parameters.robot.length
-    parts = [rounding_of(m, length) for m in equations.table.sets]
+    pairs = zip(equations.table.sets, equations.mm, strict=True)
+    parts = [rounding_of(m, length, mm) for m, mm in pairs]
     return equations.whitening.whitened(parts, noise)
 
 
-def rounding_of(measured: Measurements, length: float) -> FloatArray:
-    """Rounding errors (N, k) of what is predicted, mm and rad."""
+def rounding_of(measured: Measurements, length: float, mm: FloatArray) -> FloatArray:
+    """Rounding errors (N, k) of what is predicted, mm, rad; `mm` is `Equations.mm` of the set."""
     values = measured.values.reshape(len(measured), -1)
     lengths = np.array([unit == "mm" for unit in measured.units], dtype=bool)
     size = np.max(np.nan_to_num(np.abs(values[:, lengths])), initial=0.0) + length
-    return np.broadcast_to(
-        _ROUNDING * size / measured.instrument.mm(measured, length), values.shape
-    )
+    return np.broadcast_to(_ROUNDING * size / mm, values.shape)
 
 
 def of_read(measured: Measurements, residual: FloatArray) -> FloatArray:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from pkmcal.arguments import instance
-from pkmcal.arrays import TIED, BoolArray, FloatArray, IntArray, largest_first
+from pkmcal.arrays import TIED, BoolArray, FloatArray, IntArray, first_largest, largest_first
 from pkmcal.display import first_rows
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.evaluation import Evaluation
@@ -23,6 +23,7 @@ _GROSS = 6.0  # times the median misfit from which a row is tried in other modes
 _LEAST = 1e-3  # mm; misfits of measurements without noise
 _HALF = 0.5  # of the misfit that another mode may leave
 _FITTING = 4.0  # times what is gross, beyond which no mode fits
+_EACH = 100  # rows of which all modes are found by themselves
 _NEIGHBOURS = 6  # rows from whose poses a machine is solved whose modes are not known
 MOST_ODD = 0.5  # share of the poses that may miss grossly: of more, something else is wrong
 
@@ -64,7 +65,7 @@ def in_other_modes(equations: Equations, evaluation: Evaluation) -> list[str]:
 
 def _better(equations: Equations, evaluation: Evaluation) -> tuple[IntArray, FloatArray]:
     """Distinct rows of actuators (s,) that another mode fits better, and their poses there."""
-    machines, pose = evaluation.machines, evaluation.pose
+    pose = evaluation.pose
     none = np.empty(0, dtype=np.intp), np.empty((0, 6))
     if as_parallel(evaluation.robot) is None:
         return none  # an arm has one pose
@@ -78,16 +79,7 @@ def _better(equations: Equations, evaluation: Evaluation) -> tuple[IntArray, Flo
     if not 0 < len(gross) <= MOST_ODD * np.count_nonzero(read):
         return none
     least, best = np.where(solved, misfit, np.inf), pose.copy()
-    modes = [
-        _modes(
-            instance("robot", machines.at(k), Robot),
-            equations.table.actuators,
-            pose,
-            k,
-            misfit <= limit,
-        )
-        for k in gross.tolist()
-    ]
+    modes = _modes_of_rows(evaluation, equations.table.actuators, gross, misfit <= limit)
     for j in range(max(map(len, modes))):
         trial = pose.copy()
         for k, of_row in zip(gross, modes, strict=True):
@@ -98,6 +90,29 @@ def _better(equations: Equations, evaluation: Evaluation) -> tuple[IntArray, Flo
     fits = (least < _HALF * np.where(solved, misfit, np.inf)) & (least <= _FITTING * limit)
     better = gross[fits[gross]]
     return better, best[better]
+
+
+def _modes_of_rows(
+    evaluation: Evaluation, actuators: FloatArray, rows: IntArray, sound: BoolArray
+) -> list[FloatArray]:
+    """Poses (j, 6) that the machine may have at the actuators of each of these rows.
+
+    All modes of a row take a tenth of a second: of many rows they are found for some, and followed
+    from the nearest of these to the others.
+    """
+    spread = np.maximum(np.ptp(actuators, axis=0), np.finfo(float).tiny)
+    some = rows[np.linspace(0, len(rows) - 1, min(len(rows), _EACH)).astype(np.intp)]
+    found: dict[int, FloatArray] = {}
+    for k in [*some.tolist(), *np.setdiff1d(rows, some).tolist()]:
+        robot = instance("robot", evaluation.machines.at(k), Robot)
+        if len(found) < len(some):
+            found[k] = _modes(robot, actuators, evaluation.pose, k, sound)
+            continue
+        apart = np.linalg.norm((actuators[some] - actuators[k]) / spread, axis=1)
+        begin = found[int(some[first_largest(-apart, TIED)])]
+        solved = robot.forward(np.tile(actuators[k], (len(begin), 1)), begin)
+        found[k] = solved.pose[solved.ok]
+    return [found[k] for k in rows.tolist()]
 
 
 def _modes(

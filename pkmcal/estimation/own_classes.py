@@ -16,11 +16,12 @@ from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.effects.effect import EffectOfRows, Moved
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.prediction import Prediction
-from pkmcal.exceptions import ArgumentError
+from pkmcal.estimation.shapes import moved_by
+from pkmcal.exceptions import ArgumentError, of_the_package
 from pkmcal.readings import orientation
-from pkmcal.readings.predicted import At, of_the_package, require_arguments
+from pkmcal.readings.predicted import At, Predicted, require_arguments, require_shape
 from pkmcal.readings.reading import Reading
-from pkmcal.readings.unknowns import Dependence
+from pkmcal.readings.unknowns import ORIGIN, Dependence
 
 _LENGTH, _TURN = 1e-3, 1e-5  # mm and rad: changes of which differences are taken
 _OFF = 1e-3  # of the largest derivative by a number: what is off by more is wrong
@@ -30,11 +31,25 @@ _TWIST = ("omega x", "omega y", "omega z", "v x", "v y", "v z")
 _PLACE = ("x", "y", "z", "alpha", "beta", "gamma")
 
 Values = Callable[[float], FloatArray]  # (N, k), where one number has changed by so much
+_Part = Callable[[Moved], FloatArray]  # of a motion
 Difference = Callable[[FloatArray, FloatArray], FloatArray]
 
 
-def require_true(prediction: Prediction, evaluation: Evaluation) -> None:
+def require_true(
+    prediction: Prediction,
+    evaluation: Evaluation,
+    trusted: Callable[[object], bool] = of_the_package,
+) -> None:
     """Compare derivatives with differences, and rows with the same rows in another order.
+
+    Parameters
+    ----------
+    prediction : Prediction
+        The readings and effects.
+    evaluation : Evaluation
+        Where they are compared.
+    trusted : callable (reading or effect) -> bool, optional
+        Which are not: by default those of the package.
 
     Raises
     ------
@@ -43,14 +58,11 @@ def require_true(prediction: Prediction, evaluation: Evaluation) -> None:
     """
     for i, data in enumerate(prediction.datasets):
         reading, steps = data.measured.instrument, _steps(data.dependences())
-        effects = [
-            of_rows
-            for effect, of_rows in zip(data.effects, prediction.effects[i], strict=True)
-            if not of_the_package(effect)
-        ]
-        own = bool(reading.components) and not of_the_package(reading)
+        effects = [each for each in prediction.effects[i] if not trusted(each)]
+        own = bool(reading.components) and not trusted(reading)
         if own:
             _compare_reading(prediction, i, evaluation, steps)
+            _compare_geometry(prediction, i, evaluation)
         for effect in effects:
             _compare_effect(prediction, i, evaluation, effect, steps)
         if own or effects:
@@ -82,14 +94,18 @@ def _compare_reading(
         _compare(stated, values, step, reading.difference, (what, names, by), rows)
 
     for at, numbers, rows in prediction.in_frames(i, evaluation.pose, evaluation.theta):
-        named = {name: own for name, own in numbers.items() if name != "tool_origin"}
+        named = {name: own for name, own in numbers.items() if not name.endswith(ORIGIN)}
         require_arguments(reading, at, named, "dependences")
         seen = reading.predict(at, **numbers)
+        for side, place in (("frame", at.frame), ("other", at.other)):
+            if place is None and getattr(seen, f"by_{side}") is not None:
+                raise ArgumentError(f"{what}: by_{side} is given where `at` has no {side}")
+        read = prediction.table.sets[i].values[rows]
+        _require_inverse(reading, read, seen)
         for k, step in enumerate(of_twist):
-            by = f"by_twist, by {_TWIST[k]}"
-            compare(
-                seen.by_twist[:, :, k], _turned(reading, at, numbers, "pose", k), step, by, rows
-            )
+            moved = _turned(reading, at, numbers, "pose", k)
+            compare(seen.by_twist[:, :, k], moved, step, f"by_twist, by {_TWIST[k]}", rows)
+            _compare_difference(reading, read, seen, moved, k, rows)
             if seen.by_other is not None:
                 moved = _turned(reading, at, numbers, "other", k)
                 compare(seen.by_other[:, :, k], moved, step, f"by_other, by {_TWIST[k]}", rows)
@@ -158,25 +174,101 @@ def _compare_effect(
     numbers = prediction.arguments_of(i, theta)
     for machine, rows in prediction.machines_of(i, theta):
         at = table.pose_of[i][rows]
-        moved = partial(effect.moved, machine, evaluation.pose[at], table.actuators[at], rows)
+        place = machine, evaluation.pose[at], table.actuators[at], rows
+        moved = partial(moved_by, effect, *place)
         seen = moved(numbers)
-        for name in seen.by.keys() & prediction.numbers[i].keys():
+        sides: list[tuple[str, Mapping[str, FloatArray], _Part, tuple[str, ...]]]
+        sides = [("by", seen.by, _twist, _TWIST)]
+        if seen.growth is not None or seen.growth_by:
+            rates = {name: each[:, None] for name, each in seen.growth_by.items()}
+            sides.append(("growth_by", rates, _growth, ("growth",)))
+        for name in (seen.by.keys() | seen.growth_by.keys()) & prediction.numbers[i].keys():
             for k in np.flatnonzero(steps[name]).tolist():
-                names = what, _TWIST, f"by[{name!r}], by number {k}"
-                twists = partial(_twists, moved, numbers, name, k)
-                stated, step = seen.by[name][:, :, k], float(steps[name][k])
-                _compare(stated, twists, step, np.subtract, names, rows)
+                for side, stated, part, components in sides:
+                    names = what, components, f"{side}[{name!r}], by number {k}"
+                    found = stated.get(name, np.zeros((len(rows), len(components), k + 1)))
+                    values = partial(_of_changed, moved, part, numbers, name, k)
+                    _compare(
+                        found[:, :, k], values, float(steps[name][k]), np.subtract, names, rows
+                    )
 
 
-def _twists(
+def _twist(found: Moved) -> FloatArray:
+    return found.twist
+
+
+def _growth(found: Moved) -> FloatArray:
+    return np.zeros((len(found.twist), 1)) if found.growth is None else found.growth[:, None]
+
+
+def _of_changed(
     moved: Callable[[Mapping[str, FloatArray]], Moved],
+    part: _Part,
     numbers: Mapping[str, FloatArray],
     name: str,
     k: int,
     change: float,
 ) -> FloatArray:
-    """The twists where one number of an argument has changed in all rows."""
-    return moved(_with(numbers, name, k, change)).twist
+    """A part of the motion where one number of an argument has changed in all rows."""
+    return part(moved(_with(numbers, name, k, change)))
+
+
+def _compare_geometry(prediction: Prediction, i: int, evaluation: Evaluation) -> None:
+    """Compare what `by_geometry` states at held poses; where it states nothing, it has to be 0."""
+    table, theta = prediction.table, evaluation.theta
+    reading, scale = table.sets[i].instrument, prediction.parameters.scale
+    stated = prediction.by_geometry(i, evaluation)
+    what, rows = f"kind: by_geometry of {reading.name!r}", np.arange(len(table.sets[i]))
+    names = [name for name, _ in reading.components]
+
+    def compare(found: FloatArray, columns: IntArray, by: str) -> None:
+        direction = np.zeros(len(theta))
+        direction[columns] = scale[columns]
+
+        def values(change: float) -> FloatArray:
+            return prediction.unmoved(i, evaluation.pose, theta + change * direction).values
+
+        _compare(found, values, _LENGTH, reading.difference, (what, names, by), rows)
+
+    of_rows = len(rows), len(names)
+    if stated is None:
+        every = np.unique(table.machine_columns)
+        compare(np.zeros(of_rows), every, "None, by all numbers of the geometry together")
+        return
+    require_shape(what, stated, (*of_rows, table.machine_columns.shape[1]))
+    for j, columns in enumerate(table.machine_columns.T):
+        one = np.unique(columns)
+        own = scale[columns[table.machine_of_pose[table.pose_of[i]]]]
+        name = prediction.parameters.names[one[0]].partition("@")[0]
+        compare(stated[:, :, j] * own[:, None], one, f"by {name}, times its scale")
+
+
+def _compare_difference(
+    reading: Reading, measured: FloatArray, seen: Predicted, moved: Values, k: int, rows: IntArray
+) -> None:
+    """Compare `by_difference` with how the residual follows the twist's number `k`."""
+
+    def values(change: float) -> FloatArray:
+        return -reading.difference(measured, moved(change))
+
+    shrinks = reading.by_difference(seen.by_twist.copy(), values(0.0) * -1.0)
+    what = f"kind: by_difference or difference of {reading.name!r}"
+    names = what, [name for name, _ in reading.components], f"by {_TWIST[k]}"
+    step = _TURN if k < 3 else _LENGTH
+    made_of = float(np.abs(np.nan_to_num(seen.values)).max(initial=0.0))
+    _compare(shrinks[:, :, k], values, step, np.subtract, names, rows, made_of)
+
+
+def _require_inverse(reading: Reading, measured: FloatArray, seen: Predicted) -> None:
+    """Refuse a method `corrected` that is not the inverse of `difference`."""
+    residual = reading.difference(measured, seen.values)
+    left = reading.difference(measured, reading.corrected(seen.values, residual.copy()))
+    size = np.nan_to_num(np.abs(np.hstack([residual, seen.values]))).max(initial=0.0)
+    if (np.nan_to_num(np.abs(left)) > _OFF * np.abs(residual) + _ORDER * size).any():
+        raise ArgumentError(
+            f"kind: corrected of {reading.name!r} is not the inverse of its difference: a predicted"
+            " value that is corrected by measured less predicted has to be the measured one"
+        )
 
 
 def _compare_order(prediction: Prediction, i: int, evaluation: Evaluation) -> None:
@@ -198,7 +290,7 @@ def _compare_order(prediction: Prediction, i: int, evaluation: Evaluation) -> No
         off = np.abs(there[order] - here).reshape(len(order), -1).max(axis=1, initial=0.0)
         if (off > _ORDER * np.abs(there).max(initial=0.0)).any():
             data = prediction.datasets[i]
-            every = (data.measured.instrument, *data.effects)
+            every = (data.measured.instrument, *prediction.effects[i])
             mine = [type(each).__name__ for each in every if not of_the_package(each)]
             raise ArgumentError(
                 f"{' or '.join(mine)}: row {order[np.argmax(off)]} is predicted otherwise where the"
@@ -216,20 +308,32 @@ def _compare(
     difference: Difference,
     names: tuple[str, Iterable[str], str],
     rows: IntArray,
+    made_of: float = 0.0,
 ) -> None:
-    """Refuse a derivative (N, k) that differences to both sides contradict alike."""
+    """Refuse a derivative (N, k) that differences to both sides contradict alike.
+
+    `made_of` is how large the numbers are whose differences the values are, if they are any.
+    """
     here = values(0.0)
     ahead = difference(values(step), here) / step
     behind = difference(here, values(-step)) / step
+    what, components, by = names
+    lost = ~np.isfinite(stated) & np.isfinite(here) & np.isfinite(ahead) & np.isfinite(behind)
+    if lost.any():
+        row, k = np.unravel_index(np.argmax(lost), lost.shape)
+        raise ArgumentError(
+            f"{what}: {by}: in row {rows[row]} it states {stated[row, k]} of {list(components)[k]},"
+            " where the values are finite"
+        )
     central = (ahead + behind) / 2
-    largest = np.abs(here).max(axis=0, initial=0.0)
+    made_of = max(made_of, np.abs(np.nan_to_num(stated)).max(initial=0.0))  # if values cancel
+    largest = np.maximum(np.abs(here).max(axis=0, initial=0.0), made_of)
     sizes = np.nan_to_num(np.fmax(np.abs(stated), np.abs(central))).max(axis=0, initial=0.0)
     unsure = np.abs(ahead - behind) + _ROUNDING * largest / step  # at a kink they differ
     off = np.abs(stated - central) - _OFF * sizes - unsure
     off = np.where(np.isfinite(off), off, 0.0)
     if (off > 0.0).any():
         row, k = np.unravel_index(np.argmax(off), off.shape)
-        what, components, by = names
         raise ArgumentError(
             f"{what}: {by}: in row {rows[row]} it states {stated[row, k]:.4g} of"
             f" {list(components)[k]}, and central differences of the values are"

@@ -11,13 +11,17 @@ from typing import Any
 
 import numpy as np
 
+from pkmcal.arguments import shown
 from pkmcal.arrays import FloatArray
-from pkmcal.exceptions import ArgumentError, ArgumentTypeError
+from pkmcal.exceptions import ArgumentError, ArgumentTypeError, named_failures
 from pkmcal.readings.unknowns import Numbers
 
 Residual = Callable[[Mapping[str, float]], Any]
 ROLE = "residual"  # of numbers that a residual brings
 _STEP = 1e-3  # of what moves the machine by about 1 mm, by which parameters are varied
+_OFF = 1e-3  # of a derivative: what is off by more is wrong
+_ROUNDING = 1e-5  # of the largest derivative of a residual, for the same way of the machine
+_MOST = 1e50  # of residuals and derivatives: sums of squares of more are no numbers
 _UNITS = ("mm", "rad", "1")
 
 
@@ -88,20 +92,70 @@ def at_parameters(
         A name that there is not, no finite numbers, or now more of them than before.
     """
     values, brought = _called(residual, named(theta))
-    if brought is not None:
-        return values, _by_rates(residual, brought, rates(theta), len(values))
-    slopes = np.zeros((len(values), len(theta)))
+    if brought is None:
+        return values, np.mean(_sides(residual, named, theta, scale, values), axis=0)
+    return values, _by_rates(residual, brought, rates(theta), len(values))
+
+
+def require_true(
+    residual: Residual,
+    named: Callable[[FloatArray], Mapping[str, float]],
+    rates: Callable[[FloatArray], Mapping[str, FloatArray]],
+    theta: FloatArray,
+    scale: FloatArray,
+    names: Sequence[str],
+) -> None:
+    """Compare the derivatives that a residual brings with differences of its values.
+
+    Arguments are those of `at_parameters`, and the names (n,) of the parameters.
+
+    Raises
+    ------
+    ValueError
+        Other values of the same numbers; a derivative that is not that of the values.
+    """
+    who = f"residuals: {residual_name(residual)}"
+    values, brought = _called(residual, named(theta))
+    if not np.array_equal(values, _called(residual, named(theta))[0]):
+        raise ArgumentError(f"{who} gives other values of the same numbers when it is called again")
+    if brought is None:
+        return
+    stated = _by_rates(residual, brought, rates(theta), len(values))
+    ahead, behind = _sides(residual, named, theta, scale, values)
+    central = (ahead + behind) / 2.0
+    sizes = np.maximum(np.abs(stated), np.abs(central))
+    largest = (sizes * scale).max(axis=1, initial=0.0, keepdims=True) / scale
+    unsure = np.abs(ahead - behind) + _ROUNDING * largest  # at a kink they differ
+    off = np.abs(stated - central) - _OFF * sizes - unsure
+    if (off > 0.0).any():
+        k, i = divmod(int(np.argmax(off * scale)), len(scale))
+        raise ArgumentError(
+            f"{who}: its derivative by {names[i]} is stated as {stated[k, i]:.4g}, and central"
+            f" differences of its values are {central[k, i]:.4g}: the derivative is wrong, or the"
+            " values are"
+        )
+
+
+def _sides(
+    residual: Residual,
+    named: Callable[[FloatArray], Mapping[str, float]],
+    theta: FloatArray,
+    scale: FloatArray,
+    values: FloatArray,
+) -> FloatArray:
+    """Differences (2, k, n) by each parameter: ahead, behind."""
+    found = np.zeros((2, len(values), len(theta)))
     for i, step in enumerate(_STEP * scale):
-        high, low = theta.copy(), theta.copy()
-        high[i] += step
-        low[i] -= step
-        ends = [_called(residual, named(end))[0] for end in (high, low)]
-        if any(end.shape != values.shape for end in ends):
-            raise ArgumentError(
-                f"residuals: {residual_name(residual)} does not always give as many numbers"
-            )
-        slopes[:, i] = (ends[0] - ends[1]) / (2.0 * step)
-    return values, slopes
+        for side, change in enumerate((step, -step)):
+            there = theta.copy()
+            there[i] += change
+            end = _called(residual, named(there))[0]
+            if end.shape != values.shape:
+                raise ArgumentError(
+                    f"residuals: {residual_name(residual)} does not always give as many numbers"
+                )
+            found[side, :, i] = (end - values) / change
+    return found
 
 
 def _by_rates(
@@ -113,14 +167,27 @@ def _by_rates(
     """Derivative (k, n) by the parameters, of derivatives by name."""
     found = np.zeros((count, len(next(iter(rates.values())))))
     for name, given in brought.items():
-        slope = np.asarray(given, dtype=float).reshape(-1)
-        if name not in rates or slope.size != count or not np.isfinite(slope).all():
+        slope = _numbers(given).reshape(-1)
+        if name not in rates or slope.size != count or not (np.abs(slope) < _MOST).all():
             raise ArgumentError(
                 f"residuals: {residual_name(residual)}: its derivative by {name!r} must be by the"
-                f" name of a number, {count} finite values"
+                f" name of a number, {count} finite values below {_MOST:.0e}"
             )
         found += slope[:, None] * rates[name]
     return found
+
+
+class _NumbersByName(dict[str, float]):
+    """The numbers that a residual is given, and the errors where it asked for others."""
+
+    def __init__(self, numbers: Mapping[str, float]) -> None:
+        super().__init__(numbers)
+        self.missed: list[KeyError] = []
+
+    def __missing__(self, name: str) -> float:
+        error = KeyError(name)
+        self.missed.append(error)
+        raise error
 
 
 def _called(
@@ -128,19 +195,28 @@ def _called(
 ) -> tuple[FloatArray, Mapping[str, Any] | None]:
     """Values, and derivatives by name where the residual brings them."""
     who, brought = f"residuals: {residual_name(residual)}", None
-    try:
-        given = residual(numbers)
-    except KeyError as error:
-        raise ArgumentError(f"{who}: no number {error}, or no common one") from None
+    by_name = _NumbersByName(numbers)
+    with named_failures(residual, who, "it is given the numbers, by name"):
+        try:
+            given = residual(by_name)
+        except KeyError as error:
+            if error not in by_name.missed:
+                raise
+            raise ArgumentError(f"{who}: no number {error}, or no common one") from None
     if isinstance(given, tuple) and len(given) == 2 and isinstance(given[1], Mapping):
         given, brought = given
-    try:
-        values = np.atleast_1d(np.asarray(given, dtype=float))
-    except (TypeError, ValueError):
-        values = np.array([np.nan])
-    if values.ndim != 1 or not values.size or not np.isfinite(values).all():
+    values = _numbers(given)
+    if values.ndim != 1 or not values.size or not (np.abs(values) < _MOST).all():
         raise ArgumentError(
-            f"{who}: expected one finite number or a list of them, in standard deviations; found"
-            f" {given!r}"
+            f"{who}: expected one finite number below {_MOST:.0e} or a list of them, in standard"
+            f" deviations; found {shown(given)}"
         )
     return values, brought
+
+
+def _numbers(given: object) -> FloatArray:
+    """The numbers that were given, in an array; NaN where they are none."""
+    try:
+        return np.atleast_1d(np.asarray(given, dtype=float))
+    except (TypeError, ValueError):
+        return np.array([np.nan])

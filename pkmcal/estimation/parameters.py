@@ -6,6 +6,8 @@ unless some numbers are of a session or set: see `sessions`.
 
 from __future__ import annotations
 
+import re
+from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -15,14 +17,16 @@ import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, IntArray, held_once
 from pkmcal.core.poses import compose, compose_rates
-from pkmcal.estimation.fit_data import FRAME, Dependence, FitData
-from pkmcal.estimation.own_residuals import Residual, at_parameters, residual_name
+from pkmcal.estimation.fit_data import Dependence, FitData
+from pkmcal.estimation.own_residuals import Residual, at_parameters, require_true, residual_name
 from pkmcal.estimation.prior_functions import PriorFunction
 from pkmcal.estimation.sessions import NONE, Scope, label
 from pkmcal.estimation.smoothness import smoothness_rows
 from pkmcal.estimation.uncertain_numbers import inverse_root
 from pkmcal.geometry.stated_uncertainty import NOTHING, StatedUncertainty
 from pkmcal.kinematics.calibratable import Calibratable
+from pkmcal.readings.unknowns import Nature
+from pkmcal.result import ReadOnly
 
 Prior = float | Mapping[str, float | tuple[float, float]] | None
 Known = Literal["known", "unknown"]
@@ -41,7 +45,7 @@ class Asked:
     per_session : tuple of str
         Names or wildcards.
     by_set : frozenset of str
-        Of "frame", "target", "attachment" and "anchor", what each set has for itself.
+        Roles of what each set has for itself.
     fix : tuple of str
         Names or wildcards of numbers of the geometry that are held.
     held_points : frozenset of (str, str)
@@ -71,7 +75,7 @@ class Asked:
 
 
 @dataclass(frozen=True, eq=False)
-class Parameters:
+class Parameters(ReadOnly):
     """The parameter vector: numbers of the geometry first, then frames and what readings depend on.
 
     Attributes
@@ -98,11 +102,13 @@ class Parameters:
         Places in the geometry's values of the first numbers.
     nuisance : mapping of (str, str) to int
         First number of what is found beside the geometry, by role (`Dependence.role`) and name:
-        of each frame (`FitData.frame`), point, zero or artefact.
+        of each frame (`FitData.frame`) and of each argument of readings and effects.
+    natures : mapping of (str, str) to Nature
+        What these are, as readings and effects say it.
     origin : mapping
-        Where the six parameters of a frame or tool count from, by the first: the base in the
-        instrument's frame, or the tool on the platform, is at this pose (6,) followed by them. Near
-        it they are small, and their angles regular.
+        Where the six parameters of a frame or carried pose count from, by the first: the base in
+        the instrument's frame, or the thing on the platform, is at this pose (6,) followed by them.
+        Near it they are small, and their angles regular.
     robot : Calibratable
         The machine they belong to.
     asked : Asked
@@ -134,6 +140,7 @@ class Parameters:
     sessions: tuple[str, ...]
     places: IntArray
     nuisance: Mapping[tuple[str, str], int]
+    natures: Mapping[tuple[str, str], Nature]
     origin: Mapping[int, FloatArray]
     robot: Calibratable
     asked: Asked
@@ -183,6 +190,11 @@ class Parameters:
         by_theta = np.array([slope for _, slope in found]) / sigma[:, None]
         return np.concatenate([own, off]), np.vstack([by_theta, rows])
 
+    def require_true_residuals(self, theta: FloatArray) -> None:
+        """Refuse residuals whose derivatives are not those of their values."""
+        for each in self.residuals:
+            require_true(each, self.by_name, self.rates_by_name, theta, self.scale, self.names)
+
     @property
     def prior_names(self) -> list[str]:
         """Names of `prior_rows`, without those of uncertain numbers."""
@@ -230,11 +242,26 @@ class Parameters:
 
     @cached_property
     def motions(self) -> tuple[int, ...]:
-        """The first parameter of each frame and each tool."""
-        numbers = [at for (role, _), at in self.nuisance.items() if role in (FRAME, "tool")]
+        """The first parameter of each frame and each carried pose."""
+        numbers = [self.nuisance[key] for key, nature in self.natures.items() if nature.pose]
         if not numbers:
             return ()
         return tuple(np.flatnonzero(np.isin(self.number_of, numbers)).tolist())
+
+    @cached_property
+    def families(self) -> tuple[str, ...]:
+        """The kind of each parameter (n,): its name without the limb, or its role beside these."""
+        keys = {at: key for key, at in self.nuisance.items()}
+        firsts, found = sorted(keys), list[str]()
+        for name, number in zip(self.names, self.number_of.tolist(), strict=True):
+            at = bisect_right(firsts, number) - 1
+            key = keys[firsts[at]] if at >= 0 else ("", "")
+            kind = re.sub(r"\d+", "", name.partition("@")[0])
+            if (nature := self.natures.get(key)) is not None:
+                role = key[0].partition(" ")[0]
+                kind = f"{role}.{kind.rpartition('.')[2]}" if nature.alone else role
+            found.append(kind)
+        return tuple(found)
 
     def columns_of(self, datasets: Sequence[FitData]) -> tuple[IntArray, tuple[IntArray, ...]]:
         """Return the parameters of a row's numbers.
@@ -304,21 +331,44 @@ class Parameters:
         own = dict(zip(self.names, self.reported_rates(theta), strict=True))
         return dict(zip(geometry.names, by_theta, strict=True)) | own
 
+    def unlaid(self, theta: FloatArray, own: BoolArray | None) -> tuple[Parameters, FloatArray]:
+        """Count frames and tools that are to be laid anew from zero, and put them there.
+
+        All that are not known but for an uncertainty; with `own` (n,) those of them.
+        """
+        free = ~self.uncertain if own is None else own & ~self.uncertain
+        laid = [
+            first
+            for first in self.motions
+            if free[first] and self.origin[first].any() and not self._states_place(first)
+        ]
+        if not laid:
+            return self, theta
+        theta = theta.copy()
+        for first in laid:
+            theta[first : first + 6] = 0.0
+        return replace(self, origin={**self.origin, **dict.fromkeys(laid, np.zeros(6))}), theta
+
+    def _states_place(self, first: int) -> bool:
+        """Return whether a prior or a bound is stated of the frame or tool that begins there."""
+        mine = slice(first, first + 6)
+        return bool(np.isfinite([self.prior[mine], self.lower[mine], self.upper[mine]]).any())
+
     def aligned(
         self, theta: FloatArray, first: int, frame: FloatArray
     ) -> tuple[Parameters, FloatArray]:
-        """Put a frame or tool at `frame` (6,) and count from there.
+        """Put a frame or carried pose at `frame` (6,) and count from there.
 
         Unless a prior or bound is stated. `first` is its first parameter.
         """
         mine, theta = slice(first, first + 6), theta.copy()
-        stated = np.isfinite([self.prior[mine], self.lower[mine], self.upper[mine]]).any()
+        stated = self._states_place(first)
         theta[mine] = frame if stated else 0.0
         origin = {**self.origin, first: np.zeros(6) if stated else frame}
         return replace(self, origin=origin), theta
 
     def reported(self, theta: FloatArray) -> FloatArray:
-        """The parameters (n,) with the numbers of frames and tools counted from zero."""
+        """The parameters (n,) with the numbers of frames and carried poses counted from zero."""
         out: FloatArray = theta.copy()
         for first in self.motions:
             mine = slice(first, first + 6)

@@ -20,6 +20,7 @@ from pkmcal.estimation.estimate import Estimate
 from pkmcal.estimation.estimator import Estimator
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.mode_slips import MOST_ODD
+from pkmcal.estimation.solving import solve
 from pkmcal.kinematics.calibratable import as_parallel
 from pkmcal.kinematics.robot import Robot
 
@@ -33,13 +34,13 @@ _ROUNDS = 5  # of fitting anew from poses that were found
 
 def solved_in_least_minima(estimator: Estimator) -> Estimate:
     """Solve, and again with poses that turn out to have ended in a false minimum."""
-    estimate = estimator.solve()
+    estimate = solve(estimator)
     for _ in range(_ROUNDS):
         noise = estimate.state.noise
         better = in_least_minima(estimator.equations.fewest, estimate.evaluation, noise)
         if better is estimate.evaluation:
             break
-        estimate = estimator.solve(better)
+        estimate = solve(estimator, better)
     return estimate
 
 

@@ -18,6 +18,7 @@ from pkmcal.kinematics.drive_state import DriveState
 from pkmcal.measurements import repeats
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.tension import filled_tension
+from pkmcal.result import ReadOnly
 from pkmcal.statistics.linear_fit import numbered
 
 _ENOUGH = 8  # rows of a pose, of two numbers each, from which they tell how actuators scatter
@@ -25,7 +26,7 @@ CHANCE = 3  # rows of a set that may equal those of another one by coarse digits
 
 
 @dataclass(frozen=True, eq=False)
-class PoseTable:
+class PoseTable(ReadOnly):
     """The rows of all sets, and the distinct poses that they were read at.
 
     Rows with the same actuators, and the same noise of these, are at one pose. Where nothing else
@@ -173,7 +174,8 @@ def tells_actuators(sets: Sequence[Measurements]) -> bool:
     if not telling or any(m.actuator_sigma is not None for m in sets):
         return False
     read = sum(int(np.isfinite(m.values).all(axis=1).sum()) for m in telling)
-    return read >= _ENOUGH * sum(len(np.unique(m.actuators, axis=0)) for m in telling)
+    poses = len(np.unique(np.concatenate([m.actuators for m in telling]), axis=0))
+    return read >= _ENOUGH * poses
 
 
 def _again(
@@ -244,14 +246,12 @@ def _commands(
     approach, tension, load = (
         _of_all(each, [len(m) for m in sources]) for each in zip(*states, strict=True)
     )
+    actuators = np.concatenate(
+        [*(m.actuators for m in sets), *(m.other for m in sets if m.other is not None)]
+    )
     given = {
-        "actuators": np.concatenate(
-            [
-                *(m.actuators for m in sets),
-                *(m.other for m in sets if m.other is not None),
-            ]
-        ),
-        "picture": _pictures(sets, sources),
+        "actuators": actuators,
+        "picture": _pictures(sets, sources, actuators),
         "sigma": np.concatenate(noises) if noises else None,
         "approach": approach,
         "tension": tension if cells is None else _blank(cells.read),
@@ -261,15 +261,25 @@ def _commands(
     return {name: part for name, part in given.items() if part is not None}
 
 
-def _pictures(sets: Sequence[Measurements], sources: Sequence[Measurements]) -> FloatArray | None:
-    """Number of the picture of each row (N, 1): no two are at one pose, wherever actuators read.
+def _pictures(
+    sets: Sequence[Measurements], sources: Sequence[Measurements], actuators: FloatArray
+) -> FloatArray | None:
+    """Number of the picture of each row (N, 1): no two of a camera are at one pose.
 
-    None where no set of pictures says which rows are of one.
+    Wherever actuators read. Where each camera took one picture at the same actuators, these are of
+    one pose, whatever they are called. None where no set of pictures says which rows are of one.
     """
     if not any(m.instrument.tells_actuators and m.group is not None for m in sets):
         return None
     numbers = [np.full(len(m), -1) if m.group is None else m.group for m in sources]
-    return np.concatenate(numbers).astype(np.float64)[:, None]
+    place = np.unique(actuators, axis=0, return_inverse=True)[1].reshape(-1)
+    several = np.zeros(int(place.max()) + 1, dtype=bool)
+    ends = np.cumsum([len(m) for m in sources])[:-1]
+    for own, number in zip(np.split(place, ends), numbers, strict=True):
+        taken = np.unique(np.column_stack([own, number]), axis=0)[:, 0]
+        several |= np.bincount(taken, minlength=len(several)) > 1
+    picture = np.where(several[place], np.concatenate(numbers), -1)
+    return picture.astype(np.float64)[:, None]
 
 
 def _blank(tension: FloatArray) -> FloatArray:

@@ -7,7 +7,7 @@ A function is a sum of numbers, ``base1.z - base2.z``, or the length of a sum of
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,7 +19,6 @@ from pkmcal.kinematics.calibratable import Calibratable, NamedNumbers
 
 _OPERATOR = re.compile(r"\s+([+-])\s+")
 _BEHIND = "@.0123456789"  # a point's name without it says which body it is of
-_MOVED = re.compile(r"(frame|tool)\b")  # counted from where they are put
 _LEAST = 1e-6  # of the machine's length, below which a length has no direction
 
 
@@ -82,6 +81,7 @@ def prior_functions(
     start: Mapping[str, tuple[float, str]],
     places: IntArray,
     columns: Mapping[str, IntArray],
+    moved: Collection[str],
     *,
     strict: bool,
 ) -> tuple[PriorFunction, ...]:
@@ -99,6 +99,8 @@ def prior_functions(
         Of the free numbers in the geometry's values.
     columns : mapping of str to ndarray of int (g,)
         The parameters that they are in each session, of "" where all are common.
+    moved : collection of str
+        Parameters that count from where a frame or a carried pose is put: no function is of them.
     strict : bool
         Whether a function of nothing that is free is refused; else it is left out.
 
@@ -112,7 +114,7 @@ def prior_functions(
     for key, stated in prior.items():
         if not is_function(key, stated):
             continue
-        rows = _rows(key, robot.geometry, start)
+        rows = _rows(key, robot.geometry, start, moved)
         known, sigma = _stated(key, stated)
         if len(rows) > 1 and known is not None and known <= 0.0:
             raise ArgumentError(f"prior of {key}: a length must be above 0 mm, found {known:g}")
@@ -135,7 +137,12 @@ def prior_functions(
     return tuple(found)
 
 
-def _rows(key: str, geometry: NamedNumbers, start: Mapping[str, tuple[float, str]]) -> FloatArray:
+def _rows(
+    key: str,
+    geometry: NamedNumbers,
+    start: Mapping[str, tuple[float, str]],
+    moved: Collection[str],
+) -> FloatArray:
     """Factors (s, p + n) of all numbers in a function's sums."""
     text = key.strip()
     length = len(text) > 2 and text[0] == text[-1] == "|"
@@ -146,7 +153,7 @@ def _rows(key: str, geometry: NamedNumbers, start: Mapping[str, tuple[float, str
     rows, kinds = np.zeros((3 if length else 1, len(names))), set[str]()
     for factor, name in added:
         known = points if length else names
-        if name not in known or _MOVED.match(name):
+        if name not in known or name in moved or f"{name}.x" in moved:
             raise ArgumentError(
                 f"prior of {key}: no {'point' if length else 'number'} {name!r}"
                 f"{did_you_mean(name, known)}; expected a sum such as 'gain1 - gain2', or one"

@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray
+from pkmcal.result import ReadOnly
 
 
 @dataclass(frozen=True, eq=False)
-class RowStates:
+class RowStates(ReadOnly):
     """The state of a machine at each distinct row of actuators.
 
     Attributes

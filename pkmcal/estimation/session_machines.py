@@ -13,7 +13,7 @@ from typing import TypeVar
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray, lots
-from pkmcal.estimation.closures import Closures, ExactActuators, closures_of
+from pkmcal.estimation.closures import Closures, closures_of, following
 from pkmcal.estimation.pose_table import PoseTable
 from pkmcal.estimation.row_states import RowStates
 from pkmcal.estimation.sessions import by_parameters
@@ -38,7 +38,9 @@ class Machines:
     rows : tuple of ndarray of int
         The poses that are its own, of each.
     closures : tuple of Closures
-        Of each.
+        Of each; none where poses follow from what the actuators read.
+    read : ndarray (K, n)
+        What these read.
     state : DriveState
         From where the actuators came, the tension of what they drive, and what was carried.
     shift : ndarray (K, equations) or None
@@ -48,28 +50,29 @@ class Machines:
     robots: tuple[Calibratable, ...]
     rows: tuple[IntArray, ...]
     closures: tuple[Closures, ...]
+    read: FloatArray
     state: DriveState
     shift: FloatArray | None = None
 
     @property
     def unknowns(self) -> int:
         """Unknowns of each pose."""
-        return self.closures[0].unknowns
+        return self.closures[0].unknowns if self.closures else 0
 
     @property
     def equations(self) -> int:
         """Equations of the closures of each pose."""
-        return self.closures[0].equations
+        return self.closures[0].equations if self.closures else 0
 
     @property
     def cells(self) -> int:
         """Number of readings of load cells, which come last."""
-        return self.closures[0].cells
+        return self.closures[0].cells if self.closures else 0
 
     @property
     def actuators(self) -> tuple[int, ...]:
         """The actuator that each equation has the reading of; -1: none."""
-        return self.closures[0].actuators
+        return self.closures[0].actuators if self.closures else ()
 
     @property
     def missing(self) -> BoolArray | None:
@@ -121,7 +124,12 @@ class Machines:
 
     def settled(self, states: RowStates) -> RowStates:
         """The states near those of machines with other numbers."""
-        return self._states([each.settled(robot, own) for each, robot, own in self._each(states)])
+        if self.closures:
+            found = [each.settled(robot, own) for each, robot, own in self._each(states)]
+        else:
+            read, guesses = _apart(self.read, self.rows), _apart(states.pose, self.rows)
+            found = [*map(following, self.driven, read, guesses)]
+        return self._states(found)
 
     def moved(self, states: RowStates, step: FloatArray) -> RowStates:
         """States after steps (K, unknowns) of the unknowns."""
@@ -175,12 +183,16 @@ class Machines:
         (b, 6, g). Nothing where it does not move.
         """
         alone = len(self.rows) == 1
-        for each, robot, rows in zip(self.closures, self.robots, self.rows, strict=True):
+        for i, (robot, rows) in enumerate(zip(self.robots, self.rows, strict=True)):
             own = poses
             if not alone:
                 own = poses[rows.take(np.searchsorted(rows, poses), mode="clip") == poses]
             driven = _driven(robot, self.state.at(own))
-            found = each.twists_by_numbers(driven, _some(states, own), places)
+            if not self.closures:
+                at = states.pose[own], states.actuators[own]
+                yield own, driven.error_twists(*at).take(places, axis=2)  # no more is held
+                continue
+            found = self.closures[i].twists_by_numbers(driven, _some(states, own), places)
             if found is not None:
                 yield own, found
 
@@ -201,8 +213,7 @@ class Machines:
 
     def with_exact_actuators(self, read: FloatArray) -> Machines:
         """Return the machines with poses that follow exactly from the actuators (K, n)."""
-        exact = tuple(ExactActuators(each) for each in _apart(read, self.rows))
-        return replace(self, closures=exact, shift=None)
+        return replace(self, closures=(), read=read, shift=None)
 
 
 def _lots(rows: IntArray) -> list[IntArray]:
@@ -219,19 +230,21 @@ def machines_of(robot: Calibratable, table: PoseTable) -> Machines:
     sigma, cells = table.actuator_sigma, table.cells
     sigmas = [None] * len(rows) if sigma is None else _apart(sigma, rows)
     pairs = zip(_apart(table.actuators, rows), sigmas, strict=True)
-    closures: tuple[Closures, ...]
+    found: list[Closures | None]
     if cells is None:
-        closures = tuple(closures_of(robot, *pair, table.estimated) for pair in pairs)
+        found = [closures_of(robot, *pair, table.estimated) for pair in pairs]
     else:
-        closures = tuple(
+        found = [
             tensioned_poses(robot, *pair, cells.of(own))
             for pair, own in zip(pairs, rows, strict=True)
-        )
-    if len({(each.unknowns, each.equations) for each in closures}) > 1:
+        ]
+    closures = tuple(each for each in found if each is not None)
+    several = {(each.unknowns, each.equations) for each in closures}
+    if len(several) > 1 or len(closures) not in (0, len(rows)):
         raise ArgumentError(
             "measurements: state actuator_sigma of the same actuators in all sessions"
         )
-    return Machines((robot,) * len(rows), rows, closures, table.state)
+    return Machines((robot,) * len(rows), rows, closures, table.actuators, table.state)
 
 
 def _apart(whole: FloatArray, rows: Sequence[IntArray]) -> list[FloatArray]:

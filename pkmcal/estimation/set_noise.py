@@ -10,7 +10,8 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray
 from pkmcal.estimation.estimate import Estimate
-from pkmcal.estimation.estimator import FEW, Estimator
+from pkmcal.estimation.estimator import Estimator
+from pkmcal.estimation.solving import FEW
 from pkmcal.statistics.distributions import chi2_tail
 from pkmcal.statistics.robust_scale import median_ratio
 

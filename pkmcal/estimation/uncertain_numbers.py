@@ -7,26 +7,21 @@ equations of this prior have.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from pkmcal.arrays import FloatArray
-from pkmcal.effects.instrument_scale import InstrumentScale
-from pkmcal.estimation.fit_data import PLACE, FitData
+from pkmcal.effects.stated import BY_UNCERTAINTY
+from pkmcal.estimation.fit_data import FRAME, PLACE, FitData
 from pkmcal.estimation.sessions import matches
 from pkmcal.estimation.starts import with_starts
-from pkmcal.geometry.stated_uncertainty import SCALE, StatedUncertainty, of_geometry
+from pkmcal.geometry.stated_uncertainty import StatedUncertainty
 from pkmcal.kinematics.calibratable import Calibratable
 
 _ALIKE = 1e-4  # of a common deviation, by which numbers without one of their own may differ
-_FLAGS = {  # of a set, where what such names begin with is estimated
-    "unknown_frame": ("frame",),
-    "unknown_target": ("target", "anchor", "tool", "mounting"),
-    "unknown_attachment": ("attachment",),
-}
+_UNKNOWN = (FRAME, "target", "attachment")  # words of `identify`
 
 
 def uncertain_names(
@@ -41,7 +36,7 @@ def uncertain_names(
     """
     geometry, found = robot.geometry, set[str]()
     for pattern in stated.patterns:
-        if of_geometry(pattern, geometry.names):
+        if stated.of_geometry(pattern, geometry.names):
             found.update(geometry.match(pattern, "uncertainty"))
     found -= {*others}
     names = [name for name in geometry.names if name in found]
@@ -59,7 +54,7 @@ def spread(stated: StatedUncertainty, names: Sequence[str]) -> FloatArray:
         pattern, common[i] = _last(stated.common, name)
         if _last(stated.consider, name)[1] > 0.0:  # allowed for otherwise
             own[i] = common[i] = 0.0
-        groups.setdefault((pattern, _alike(name)), []).append(i)
+        groups.setdefault((pattern, stated.alike(name)), []).append(i)
     for (pattern, _), mine in groups.items():
         if pattern:
             shared[np.ix_(mine, mine)] = np.outer(common[mine], common[mine])
@@ -90,22 +85,25 @@ def uncertain_sets(
     """
     names, sets = robot.geometry.names, list(datasets)
     either = {**stated.own, **stated.common}
-    beside = [each for each in either if either[each] > 0.0 and not of_geometry(each, names)]
+    beside = [each for each in either if either[each] > 0.0 and not stated.of_geometry(each, names)]
     roles = set[str]()
-    for flag, begins in _FLAGS.items():
-        meant = any(pattern.startswith(begins) for pattern in beside)
-        if not meant or any(getattr(data, flag) for data in datasets):
+    for word in _UNKNOWN:
+        flag = f"unknown_{word}"
+        if any(getattr(data, flag) for data in datasets):
             continue
         for i, data in enumerate(sets):
+            if not any(pattern.startswith(data.roles(word)) for pattern in beside):
+                continue
             (other,) = with_starts(robot, [replace(data, **{flag: True})])  # type: ignore[arg-type]
             known, found = _estimated(data), _estimated(other).items()
             new = {role: own for role, own in found if own != known.get(role)}
             if any(_last(either, name)[1] > 0.0 for own in new.values() for name in own):
                 sets[i] = other
                 roles |= {*new}
-    if SCALE in beside and not any(each.name == SCALE for each in sets[0].effects):
-        sets = [replace(data, effects=(*data.effects, InstrumentScale())) for data in sets]
-        roles.add(SCALE)
+    for name, effect in BY_UNCERTAINTY.items():
+        if name in beside and not any(each.name == name for each in sets[0].effects):
+            sets = [replace(data, effects=(*data.effects, effect)) for data in sets]
+            roles.add(name)
     return sets, frozenset(roles)
 
 
@@ -113,7 +111,7 @@ def _estimated(data: FitData) -> dict[str, list[str]]:
     """Names of what is estimated beside the geometry, by role."""
     found: dict[str, list[str]] = {}
     if data.framed:
-        found["frame"] = [f"frame.{axis}" for axis, _ in PLACE]
+        found[FRAME] = [f"{FRAME}.{axis}" for axis, _ in PLACE]
     for each in data.dependences():
         for own in each.estimated.values():
             found.setdefault(each.role, []).extend(own.names)
@@ -126,11 +124,3 @@ def _last(entries: Mapping[str, float], name: str) -> tuple[str, float]:
         if matches(pattern, name):
             return pattern, entries[pattern]
     return "", 0.0
-
-
-def _alike(name: str) -> str:
-    """Return the kind, coordinate and session that numbers with a common error share."""
-    stem, _, behind = name.partition("@")
-    point, dot, axis = stem.partition(".")
-    kind = re.sub(r"(?<=target|anchor).+|(?<=attachment).+|\d+$", "", point)
-    return f"{kind}{dot}{axis}@{behind}"

@@ -8,17 +8,20 @@ from functools import cached_property
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, IntArray
+from pkmcal.estimation.chosen_covariance import chosen_covariance, own_deviations
 from pkmcal.estimation.coarse_readings import Coarse, coarse_readings, component_of
 from pkmcal.estimation.cut_readings import Cut, cut_readings
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.estimate import Estimate
-from pkmcal.estimation.estimator import FEW, Estimator
-from pkmcal.estimation.labels import Labels, component_classes, poses_of_rows
-from pkmcal.estimation.linear_model import LinearModel, prior_residual
+from pkmcal.estimation.estimator import Estimator
+from pkmcal.estimation.linear_model import prior_residual
 from pkmcal.estimation.misfits import rounding, rounding_of_readings
+from pkmcal.estimation.row_blocks import RowBlocks
 from pkmcal.estimation.set_noise import slipped
+from pkmcal.estimation.solving import FEW, unknown_noise
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.statistics.covariance import Covariance, CovarianceRule, covariance
+from pkmcal.result import ReadOnly, read_only
+from pkmcal.statistics.covariance import Covariance, CovarianceRule
 from pkmcal.statistics.linear_fit import (
     LinearFit,
     Solved,
@@ -27,7 +30,7 @@ from pkmcal.statistics.linear_fit import (
     reweighted,
 )
 from pkmcal.statistics.noise import Noise, Split, joined, noise, split
-from pkmcal.statistics.variance_components import told_apart, variance_components
+from pkmcal.statistics.weighed import Weighed
 
 ROUNDED = 1e3  # times errors of rounding, below which residuals may be nothing else
 
@@ -44,13 +47,11 @@ def stated_variances(measured: Measurements, family: int = 0) -> FloatArray | No
 
 
 @dataclass(frozen=True, eq=False)
-class Uncertainty:
+class Uncertainty(ReadOnly):
     """Covariance, degrees of freedom and noise of an estimate.
 
     Attributes
     ----------
-    labels : Labels
-        Of the equations.
     fit : LinearFit
         The linear fit at the solution, whitened.
     covariance : Covariance
@@ -72,7 +73,7 @@ class Uncertainty:
     prior_residual : ndarray (q,)
         Residuals of the prior's rows.
     information : ndarray (G, G)
-        What the residuals inform of the noise of the groups: see `elimination.Shares`.
+        What the residuals inform of the noise of the groups: see `pose_system.Shares`.
     considered : ndarray (p, k) or None
         How the basis follows numbers that are not fitted along, in their stated deviations.
     noise_share : float
@@ -81,7 +82,6 @@ class Uncertainty:
         The fit with these numbers fitted along, and residuals of its prior's rows.
     """
 
-    labels: Labels
     fit: LinearFit
     covariance: Covariance
     reported: FloatArray
@@ -120,16 +120,21 @@ class Uncertainty:
         return bool(np.linalg.norm(residual[use]) < ROUNDED * np.linalg.norm(errors))
 
     @property
+    def blocks(self) -> RowBlocks:
+        """The rows, poses and components that the equations are of."""
+        return self.equations.blocks
+
+    @property
     def mixed(self) -> bool:
-        """True if equations are mixtures of readings and closures; see `labels`."""
+        """True if equations are mixtures of readings and closures."""
         return bool(self.equations.machines.unknowns)
 
     @cached_property
     def matrix(self) -> FloatArray:
         """Covariance (n, n) of the reported parameters; inf where the noise is not known."""
         if not self.known:
-            return np.full((len(self.reported),) * 2, np.inf)
-        return self.covariance.of(self.reported) + self._beside(self.reported)
+            return read_only(np.full((len(self.reported),) * 2, np.inf))
+        return read_only(self.covariance.of(self.reported) + self._beside(self.reported))
 
     @cached_property
     def scaled(self) -> FloatArray:
@@ -147,15 +152,28 @@ class Uncertainty:
         return (self.fit, self.prior_residual) if self.allowed is None else self.allowed
 
     @cached_property
-    def of_own_deviations(self) -> Solved:
-        """The tested fit with each component in units of its own deviation, as `Solved`.
+    def own_deviations(self) -> FloatArray | None:
+        """Deviation of each equation (M,) in units of the present one, by its component.
 
-        Where a stated sigma is right for some of the components and too small for others, tests of
-        the linear model take what these miss for what they look for.
+        None where those that they have will do. Where a stated sigma is right for some of the
+        components and too small for others, tests of the linear model take what these miss for
+        what they look for.
         """
         if self.mixed or self.equations.blocks.unstated.all():
-            return self.tested_with_prior  # where none is stated, they have their own already
-        return _of_own_deviations(*self.tested_with_prior, self.labels, self._place)
+            return None  # where none is stated, they have their own already
+        return own_deviations(*self.tested_with_prior, self.blocks, self._place)
+
+    @cached_property
+    def of_own_deviations(self) -> Solved:
+        """The tested fit with each component in units of its own deviation, as `Solved`."""
+        fit, beyond = self.tested_with_prior
+        own = self.own_deviations
+        return (fit, beyond) if own is None else reweighted(fit, own, beyond)
+
+    @cached_property
+    def weighed(self) -> Weighed:
+        """The tested fit with the deviations of `of_own_deviations`, of equations not mixed."""
+        return Weighed(self.of_own_deviations[0], self.own_deviations)
 
     def _beside(self, contrasts: FloatArray) -> FloatArray | float:
         """Return the covariance of contrasts (q, p) by offsets and numbers not fitted."""
@@ -185,11 +203,6 @@ class Uncertainty:
         with np.errstate(divide="ignore", invalid="ignore"):
             widened: FloatArray = own * (1.0 + known / data) ** 2  # what is stated is known
         return np.where(data > 0.0, widened, own)
-
-    @property
-    def poses(self) -> IntArray:
-        """Number of the pose of each row (N,)."""
-        return poses_of_rows(self.equations)
 
     @cached_property
     def by_cluster(self) -> FloatArray:
@@ -224,7 +237,7 @@ class Uncertainty:
 
     def lengths_of(self, i: int) -> BoolArray:
         """Equations (M,) of set `i` that are lengths."""
-        chosen: BoolArray = self.labels.length & (self.labels.set_of == i)
+        chosen: BoolArray = self.blocks.length & (self.blocks.set_of == i)
         return chosen
 
     @cached_property
@@ -245,14 +258,14 @@ class Uncertainty:
     def family_of(self, i: int, family: int) -> BoolArray:
         """Equations (M,) of one family of set `i`, by its number there."""
         columns = self.equations.table.sets[i].instrument.families[family].columns
-        mine: BoolArray = (self.labels.set_of == i) & np.isin(self._place, columns)
+        mine: BoolArray = (self.blocks.set_of == i) & np.isin(self._place, columns)
         return mine
 
     @cached_property
     def _place(self) -> IntArray:
         """Component of its row for each equation (M,)."""
         place = component_of(self.equations)
-        return self.labels.component if np.array_equal(place, self.labels.component) else place
+        return self.blocks.component if np.array_equal(place, self.blocks.component) else place
 
     def freedom_of_noise(self, shares: FloatArray) -> float:
         """Degrees of freedom of a variance of which groups make these shares (G,).
@@ -285,7 +298,7 @@ class Uncertainty:
         """Variances of an equation in units of what it was whitened by."""
         if self.equations.blocks.unstated.any() or self.fit.freedom >= FEW:
             sandwich = self.covariance.sandwich
-            total, shared = noise(sandwich.residual, sandwich.retained, self.fit.key)
+            total, shared = noise(sandwich.residual, sandwich.retained, self.fit.key())
             shown = 1.0 - self.fit.exact / float(sandwich.retained.sum())
             return total / shown, shared / shown
         return 1.0, 0.0
@@ -308,7 +321,7 @@ class Uncertainty:
             return float(stated.mean()), 0.0
         mine = self.family_of(i, family) if family else self.lengths_of(i)
         retained = self.covariance.sandwich.retained[mine]
-        total, shared = noise(self.adjusted[mine], retained, numbered(self.fit.key[mine]))
+        total, shared = noise(self.adjusted[mine], retained, numbered(self.fit.key()[mine]))
         return max(total, self._rounding(i, family)), shared
 
     def stated_variances(self, i: int, family: int = 0) -> FloatArray | None:
@@ -322,11 +335,15 @@ class Uncertainty:
         return variances
 
     @cached_property
-    def _repeated(self) -> IntArray:
-        """Number of the reading of each equation (M,): repeats of it have the same."""
-        key = self.fit.key
-        alone = int(key.max()) + 1 == len(key)
-        return key if alone else numbered(key, self.labels.target)
+    def _repeated(self) -> IntArray | None:
+        """Number of the reading of each equation (M,): repeats of it have the same.
+
+        None where nothing was read again.
+        """
+        key = self.fit.key()
+        if int(key.max()) + 1 < len(key):
+            key = numbered(key, self.blocks.target)
+        return key if int(key.max()) + 1 < len(key) else None
 
     def repeats(self, plain: bool = False) -> Split:
         """Pure error and lack of fit, whitened; `plain`: of lengths in mm.
@@ -336,13 +353,13 @@ class Uncertainty:
         if self.mixed:
             return joined([])
         key = self._repeated
-        if int(key.max()) + 1 == len(key):
+        if key is None:
             return joined([])
         values = self.in_units(self.fit.residual) if plain else self.fit.residual
-        parts = []
+        leverages, parts = self.fit.leverage(), []
         for i in range(len(self.equations.table.sets)):
-            mine = self.lengths_of(i) if plain else self.labels.set_of == i
-            leverage = float(self.fit.leverage[mine].sum())
+            mine = self.lengths_of(i) if plain else self.blocks.set_of == i
+            leverage = float(leverages[mine].sum())
             if mine.any():
                 parts.append(split(values[mine], numbered(key[mine]), leverage))
         return joined(parts)
@@ -351,72 +368,33 @@ class Uncertainty:
 def uncertainty(
     estimator: Estimator,
     estimate: Estimate,
-    solution: LinearModel,
+    fit: LinearFit,
     rule: CovarianceRule,
     classes: IntArray | None = None,
 ) -> Uncertainty:
-    """Say how sure an estimate is, of which `solved` made the linear model `solution`.
+    """Say how sure an estimate is, of which `solved` made the linear model `fit`.
 
     `classes` (M,) are those of equations whose variances were estimated apart: see
     `unlike_components`.
     """
     equations, state = estimator.equations, estimate.state
-    named, fit = solution
     chosen = equations.parameters
     rates = chosen.reported_rates(estimate.evaluation.theta) * chosen.scale
-    if (
-        rule == "auto"
-        and equations.machines.unknowns
-        and fit.clusters < len(equations.blocks.components)
-    ):
-        rule = "cluster"  # no two mixtures can be compared to see whether they share an error
     slips = slipped(estimator, estimate)
-    if rule == "auto" and (slips != 1.0).any():
-        rule = "cluster"  # which holds whatever the weights
-    apart = None
-    if classes is not None:
-        apart = variance_components(fit, classes, prior_residual(estimator, estimate))
-    found = covariance(
-        fit,
-        rule,
-        stated=not estimator.unstated.any(),
-        robust=estimator.loss != "linear",
-        components=apart,
-    )
     beyond = prior_residual(estimator, estimate)
-    refuted = not estimator.unstated.any() and np.isfinite(found.scale_freedom)
-    refuted = refuted and rule == "auto" and not equations.machines.unknowns
-    place = component_of(equations)
-    if refuted and _of_own_deviations(fit, beyond, named, place)[0] is not fit:
-        found = replace(found, rule="cluster")  # sigma is wrong of some components alone
-    coarse = coarse_readings(equations, named, place, fit, state.noise, found)
+    found = chosen_covariance(estimator, fit, rule, beyond, slips, classes)
+    coarse = coarse_readings(equations, fit, state.noise, found)
     widening = max((each.widening for each in coarse), default=1.0)
     return Uncertainty(
-        labels=named,
         fit=fit,
         covariance=found if widening == 1.0 else replace(found, widening=widening),
         reported=rates @ fit.back,
-        unknown=estimator.unknown_noise(estimate),
+        unknown=unknown_noise(estimator, estimate),
         equations=equations,
         factors=state.noise,
         slips=slips,
         coarse=coarse,
-        cut=tuple(cut_readings(equations, named, fit, state.noise, coarse)),
+        cut=tuple(cut_readings(equations, fit, state.noise, coarse)),
         prior_residual=beyond,
         information=estimate.shares[2],
     )
-
-
-def _of_own_deviations(
-    fit: LinearFit, beyond: FloatArray, named: Labels, place: IntArray
-) -> Solved:
-    """Return the fit with other weights of components, or itself if those that it has will do.
-
-    `beyond` are the residuals of the prior's rows.
-    """
-    if not named.component.any():
-        return fit, beyond  # a single component
-    found = told_apart(fit, component_classes(named, place), beyond)
-    if found is None:
-        return fit, beyond
-    return reweighted(fit, np.sqrt(found.variances)[found.classes], beyond)

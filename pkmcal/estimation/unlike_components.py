@@ -8,15 +8,16 @@ from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.estimation.coarse_readings import component_of
 from pkmcal.estimation.estimate import Estimate
 from pkmcal.estimation.estimator import Estimator
-from pkmcal.estimation.labels import component_classes
-from pkmcal.estimation.linear_model import LinearModel, prior_residual
+from pkmcal.estimation.linear_model import prior_residual
+from pkmcal.estimation.row_blocks import component_classes
 from pkmcal.statistics.clusters import shared_error_score
 from pkmcal.statistics.covariance import SHARED
+from pkmcal.statistics.linear_fit import LinearFit
 from pkmcal.statistics.variance_components import told_apart
 
 
 def unlike_components(
-    estimator: Estimator, estimate: Estimate, solution: LinearModel
+    estimator: Estimator, estimate: Estimate, fit: LinearFit
 ) -> tuple[IntArray, list[FloatArray]] | None:
     """Test sets without sigma for components of unlike variance.
 
@@ -39,15 +40,14 @@ def unlike_components(
         return None
     if estimator.loss != "linear" or not estimator.unstated.all() or not several:
         return None
-    named, fit = solution
     if shared_error_score(fit) > SHARED:
         return None
-    place = component_of(equations)
-    found = told_apart(fit, component_classes(named, place), prior_residual(estimator, estimate))
+    blocks, place = equations.blocks, component_of(equations)
+    found = told_apart(fit, component_classes(blocks, place), prior_residual(estimator, estimate))
     if found is None:
         return None
     deviations = [np.ones(len(m.components)) for m in equations.table.sets]
     of_equation = np.sqrt(found.variances)[found.classes]
-    for i, k, deviation in zip(named.set_of, place, of_equation, strict=True):
+    for i, k, deviation in zip(blocks.set_of, place, of_equation, strict=True):
         deviations[i][k] = deviation
     return found.classes, deviations

@@ -6,7 +6,7 @@ from pkmcal.arguments import did_you_mean
 from pkmcal.estimation.parameters import Parameters
 from pkmcal.estimation.sessions import matches
 from pkmcal.exceptions import ArgumentError
-from pkmcal.geometry.stated_uncertainty import StatedUncertainty, of_geometry
+from pkmcal.geometry.stated_uncertainty import StatedUncertainty
 
 
 def require_used(stated: StatedUncertainty, chosen: Parameters) -> None:
@@ -26,7 +26,7 @@ def require_used(stated: StatedUncertainty, chosen: Parameters) -> None:
     sigma = {**stated.common, **stated.own}
     for pattern in stated.patterns:
         found = any(matches(pattern, name) for name in free)
-        if of_geometry(pattern, geometry.names):
+        if stated.of_geometry(pattern, geometry.names):
             meant = set(geometry.match(pattern, "uncertainty")) - held
             if not meant:
                 raise ArgumentError(f"uncertainty: {pattern} is held as exact by fix: one of both")

@@ -187,7 +187,7 @@ def _whitening(measured: Measurements, length: float) -> FloatArray:
     sigma = measured.sigma
     if sigma is None:
         mm = measured.instrument.mm(measured, length)
-        return np.tile(mm, (len(measured), 1))
+        return np.broadcast_to(mm, (len(measured), len(measured.components)))
     first = measured.instrument.turning
     if first is not None and not _same_turnings(sigma, first):
         sigma = orientation.covariance(sigma, np.nan_to_num(measured.values[:, first:]))

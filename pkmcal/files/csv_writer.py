@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from os import PathLike
 from typing import NamedTuple
 
@@ -13,6 +13,7 @@ import numpy as np
 
 from pkmcal import arguments
 from pkmcal.arrays import FloatArray, IntArray, TextArray
+from pkmcal.exceptions import ArgumentError
 from pkmcal.files.atomic import write_whole
 
 
@@ -44,6 +45,25 @@ class WrittenColumn(NamedTuple):
         if values.dtype.kind != "f":
             return [str(value) for value in values.tolist()]
         return ["" if math.isnan(value) else repr(value) for value in values.tolist()]
+
+
+def with_cells(
+    columns: Iterable[WrittenColumn], rows: int, owner: object
+) -> Iterator[WrittenColumn]:
+    """The columns of a reading; refuses one without a cell for each of its rows.
+
+    Raises
+    ------
+    ValueError
+        The class and the column, by their names.
+    """
+    for column in columns:
+        if np.shape(column.values) != (rows,):
+            raise ArgumentError(
+                f"kind: the class {type(owner).__name__} writes the column {column.name!r} with"
+                f" shape {np.shape(column.values)}: one cell for each of {rows} rows is needed"
+            )
+        yield column
 
 
 def numbered(

@@ -23,6 +23,7 @@ from pkmcal.estimation.identifiability import ALIKE, decompose, listed
 from pkmcal.estimation.parameters import Asked, Parameters
 from pkmcal.kinematics.calibratable import as_parallel
 from pkmcal.kinematics.workspace import sample_poses
+from pkmcal.readings.unknowns import PLAIN
 from pkmcal.screw import from_pose
 from pkmcal.statistics.linear_fit import ROUNDING
 from pkmcal.statistics.singular_values import svd
@@ -30,7 +31,6 @@ from pkmcal.statistics.singular_values import svd
 DATUM = "datum"  # the word that `fix` takes for them
 
 _POSES, _SHARE = 60, 0.7  # at which twists are compared, and how far out
-_POINTS = ("target", "attachment", "anchor")  # what a reading depends on and a frame moves
 _OUTSIDE = 1e-6  # share of a combination outside some others that does not count
 _FAMILIAR = 0.1  # of the best number's: a coordinate is held that has as much
 _SAME_POINT = 2.0  # how much rather another coordinate of the same point is held
@@ -125,7 +125,7 @@ def _held_points(
     rest: FloatArray = open_ones @ rows[rank:].T  # without any number of the geometry
     held = []
     for point, first in chosen.nuisance.items():
-        if point[0] not in _POINTS:
+        if not chosen.natures.get(point, PLAIN).point_of:
             continue
         mine = np.flatnonzero(np.isin(chosen.number_of, np.arange(first, first + 3)))
         if len(mine) != 3 or stated[mine].any():  # or there is one in each session

@@ -27,6 +27,9 @@ class Distances:
     rms_without_outliers: float = float("nan")
 
 
+NO_DISTANCES = Distances()
+
+
 def distances(off: FloatArray, outliers: BoolArray) -> Distances:
     """Summarise distances (N,); `outliers` (N,) says which are.
 
@@ -38,7 +41,7 @@ def distances(off: FloatArray, outliers: BoolArray) -> Distances:
     """
     reached = np.isfinite(off)
     if not reached.any():
-        return Distances()
+        return NO_DISTANCES
     median, high = np.quantile(off[reached], [0.5, 0.95]).tolist()
     return Distances(rms_reached(off), median, high, rms(off[reached & ~outliers]))
 

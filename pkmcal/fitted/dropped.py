@@ -129,11 +129,9 @@ def elsewhere(equations: Equations, estimate: Estimate) -> IntArray:
     return found
 
 
-def robust_outliers(
-    equations: Equations, commanded: Equations, start: Evaluation
-) -> tuple[int, ...]:
+def robust_outliers(equations: Equations, start: Evaluation) -> tuple[int, ...]:
     """Numbers of the rows that a robust fit from this start finds outlying."""
-    estimator = estimator_at(equations, commanded, start, "cauchy")
+    estimator = estimator_at(equations, start, "cauchy")
     return tuple(
         equations.table.rows[outlying(estimator, solved_in_least_minima(estimator))].tolist()
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -13,42 +13,16 @@ from pkmcal.estimation.estimate import Estimate
 from pkmcal.estimation.estimator import Estimator
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.identifiability import decompose
-from pkmcal.estimation.linear_model import LinearModel, solved
+from pkmcal.estimation.linear_model import solved
 from pkmcal.estimation.parameters import Parameters
 from pkmcal.estimation.uncertainty import Uncertainty, uncertainty
 from pkmcal.fitted.datum import NO_DATUM, Datum
 from pkmcal.fitted.held_numbers import with_considered
 from pkmcal.fitted.slack import Cell
 from pkmcal.statistics.covariance import CovarianceRule
+from pkmcal.statistics.linear_fit import LinearFit
 
 _LEAST = 1e-6  # share of a combination that is more than rounding
-
-
-@dataclass(frozen=True, eq=False)
-class Problem:
-    """Equations to be solved.
-
-    Attributes
-    ----------
-    equations : Equations
-        Of the fitted rows.
-    exact : Equations
-        With poses that follow from the actuators exactly; the same ones where poses have no
-        unknowns.
-    start : Evaluation
-        Where these begin: at the nominal machine, unknown frames aligned with the readings.
-    slack : tuple of Cell
-        Readings of slack cables that are left out.
-    """
-
-    equations: Equations
-    exact: Equations
-    start: Evaluation
-    slack: tuple[Cell, ...] = ()
-
-    def of(self, equations: Equations) -> Problem:
-        """Return a fit of other equations, which begins where this one began."""
-        return replace(self, equations=equations, exact=equations.with_exact_actuators())
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,13 +31,16 @@ class Fit:
 
     Attributes
     ----------
-    problem : Problem
-        What was solved.
+    aligned : Evaluation
+        Where the search began, poses following from the actuators: at the nominal machine, unknown
+        frames aligned with the readings.
     estimator : Estimator
-        The search for it.
+        The equations of the fitted rows, and the search.
     estimate : Estimate
         What was fitted at the solution, with its statistics. On machines where every row has a
         pose of its own the residual equations there are those that are left of all.
+    slack : tuple of Cell
+        Readings of slack cables that are left out.
     datum : Datum
         Numbers that are held because they only say where frames lie.
     classes : ndarray of int (M,) or None
@@ -72,9 +49,10 @@ class Fit:
         Whether rows of a pose are taken to share errors.
     """
 
-    problem: Problem
+    aligned: Evaluation
     estimator: Estimator
     estimate: Estimate
+    slack: tuple[Cell, ...] = ()
     datum: Datum = NO_DATUM
     classes: IntArray | None = None
     rule: CovarianceRule = "auto"
@@ -82,15 +60,30 @@ class Fit:
     @cached_property
     def start(self) -> Evaluation:
         """The equations at the nominal machine, all unknowns of the readings fitted to it."""
-        return self.problem.exact.of_machine_alone(self.problem.start)
+        return self._exact.of_machine_alone(self.aligned)
+
+    @cached_property
+    def _exact(self) -> Equations:
+        """The equations with poses that follow from the actuators exactly."""
+        return self.estimator.equations.with_exact_actuators()
+
+    @cached_property
+    def before(self) -> Evaluation:
+        """The fitted equations at the numbers of `start`: where poses have unknowns, these fitted.
+
+        The search may begin elsewhere, where frames and targets are found one after the other.
+        """
+        begun, theta = self.estimator.start, self.start.theta
+        if np.array_equal(theta, begun.theta):
+            return begun
+        return self.estimator.equations.at(theta, near=begun)
 
     @cached_property
     def equations(self) -> Equations:
         """The residual equations of the fitted rows, poses following from the actuators."""
-        exact = self.problem.exact
-        if exact is self.estimator.equations:
-            return exact
-        return exact.with_tension(self.estimate.evaluation.states.tension)
+        if self._exact is self.estimator.equations:
+            return self._exact
+        return self._exact.with_tension(self.estimate.evaluation.states.tension)
 
     @cached_property
     def end(self) -> Evaluation:
@@ -101,7 +94,7 @@ class Fit:
         return self.equations.at(solution.theta, near=solution)
 
     @cached_property
-    def linear(self) -> LinearModel:
+    def linear(self) -> LinearFit:
         """The linear model at the solution."""
         return solved(self.estimator, self.estimate)
 

@@ -30,15 +30,15 @@ INVOLVED = 1e-6  # share of a parameter in unidentifiable combinations from whic
 
 
 def parameter_table(
-    estimator: Estimator, estimate: Estimate, uncertainty: Uncertainty
+    estimator: Estimator, estimate: Estimate, uncertainty: Uncertainty, start: FloatArray
 ) -> dict[str, Any]:
-    """The parameters with their uncertainty."""
+    """The parameters, their uncertainty, and what they were before the calibration: `start`."""
     chosen, theta = estimator.equations.parameters, estimate.evaluation.theta
     rates = chosen.reported_rates(theta) * chosen.scale
     along = rates @ estimate.state.determined.unidentifiable
     unknown = np.linalg.norm(along, axis=1) > INVOLVED * chosen.scale
     unknown |= uncertainty.freedom <= 0  # nothing shows the deviation
-    rank, size = estimate.state.determined.rank, chosen.robot.length
+    rank, size = estimate.state.determined.rank, estimator.size
     held = rates @ held_errors(estimate.triangle, estimate.prior, rank, size)
     shown = uncertainty.matrix + held @ held.T
     shown[unknown] = shown[:, unknown] = np.nan
@@ -49,7 +49,8 @@ def parameter_table(
     half = t_factor(freedom) * np.where(np.isfinite(stderr), stderr, np.inf)
     at_bound = np.zeros(len(chosen), dtype=bool)
     for bound in chosen.bounds:
-        at_bound |= np.isclose(theta, bound, rtol=1e-9, atol=1e-9)
+        if np.isfinite(bound).any():
+            at_bound |= np.isclose(theta, bound, rtol=1e-9, atol=1e-9)
     by_design = rates @ estimate.covariance @ rates.T
     beside = nuisances(chosen, theta, values, by_design)
     mine = np.flatnonzero(in_result(chosen, beside))
@@ -59,7 +60,7 @@ def parameter_table(
         "units": tuple(chosen.units[i] for i in mine),
         "columns": mine,
         "values": values[mine],
-        "start": chosen.reported(estimator.start.theta)[mine],
+        "start": chosen.reported(start)[mine],
         "stderr": stderr[mine],
         "parameter_dof": freedom[mine],
         "interval95": np.column_stack([values - half, values + half])[mine],
@@ -92,7 +93,7 @@ def identifiability(estimator: Estimator, estimate: Estimate, hidden: int) -> di
             names, _ = gauges(chosen, estimate.state.determined.unidentifiable)
     if mirror_fits(equations, estimate.evaluation, estimate.state.noise):
         names = (*names, MIRROR)
-    open_ones = sparse_basis(rest, chosen.names).T
+    open_ones = sparse_basis(rest, chosen.families).T
     return {
         "rank": measured.rank - hidden,
         "gap": measured.gap,
@@ -109,10 +110,12 @@ def misfit(
     estimate: Estimate,
     uncertainty: Uncertainty,
     commanded: tuple[Evaluation, Evaluation],
+    begun: Evaluation,
 ) -> dict[str, Any]:
     """Residuals before and after, χ² per degree of freedom, noise and outliers.
 
-    `commanded` are the equations before and after with poses that follow from the actuators.
+    `commanded` are the equations before and after with poses that follow from the actuators;
+    `begun` are the fitted ones before.
     """
     start, end = commanded
     equations, state = estimator.equations, estimate.state
@@ -128,8 +131,7 @@ def misfit(
     left = np.bincount(set_of_group, estimate.freedom[: len(set_of_group)], len(sets))
     beside = estimate.freedom[len(set_of_group) :]
     by_component = tuple(
-        tuple((arc / m.instrument.mm(m, estimator.start.robot.length)).tolist())
-        for m, arc in zip(sets, arcs, strict=True)
+        tuple((arc / own).tolist()) for own, arc in zip(equations.arcs, arcs, strict=True)
     )
     named = outlying(estimator, estimate)
     before, after = (rms_reached(misfits.distances(equations, each)) for each in (start, end))
@@ -137,7 +139,8 @@ def misfit(
         "rms": after,
         "rms_before": before,
         "closure_rms": misfits.closure_rms(equations, estimate.evaluation),
-        "closure_rms_before": misfits.closure_rms(equations, estimator.start),
+        "closure_rms_before": misfits.closure_rms(equations, begun),
+        "history": (misfits.progress(equations, begun), *estimate.history[1:]),
         "closures": misfits.worst_closures(equations, estimate.evaluation),
         "actuator_noise": float(shown[-1]) if equations.machines.unknowns else float("nan"),
         "tension_noise": float(shown[-2]) if equations.machines.cells else float("nan"),

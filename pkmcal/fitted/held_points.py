@@ -13,15 +13,15 @@ import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, IntArray, mm_per_unit
 from pkmcal.estimation.equations import Equations
-from pkmcal.estimation.estimator import FEW
 from pkmcal.estimation.evaluation import Evaluation
-from pkmcal.estimation.labels import Labels
+from pkmcal.estimation.row_blocks import RowBlocks
+from pkmcal.estimation.solving import FEW
 from pkmcal.estimation.uncertainty import Uncertainty, stated_variances
 from pkmcal.fitted.held_numbers import considered_errors
 from pkmcal.fitted.later import Later, OwnNumbers
 from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.readings.reading import Family
+from pkmcal.readings.components import Family
 from pkmcal.statistics.distributions import f_tail
 from pkmcal.statistics.holdout_test import RATIO, HoldoutTest, Lengths, holdout_test
 from pkmcal.statistics.linear_fit import met_exactly, numbered
@@ -122,7 +122,6 @@ def points(
     rows: Later,
     equations: Equations,
     after: Evaluation,
-    named: Labels,
     own: OwnNumbers | None,
     uncertainty: Uncertainty,
 ) -> Points:
@@ -166,7 +165,7 @@ def points(
         taken = np.clip(((by_own @ own.half) ** 2).sum(axis=1) / weighted, 0.0, 1.0)
     units = tuple(dict.fromkeys(unit for m in equations.table.sets for unit in m.units))
     residual = stacked([a * part for a, part in zip(arcs, after.residuals, strict=True)])
-    idle = met_exactly(residual, named.component) & bool(uncertainty.idle.any())
+    idle = met_exactly(residual, equations.blocks.component) & bool(uncertainty.idle.any())
     return Points(
         residual=residual,
         design=by_fitted @ back,
@@ -178,7 +177,7 @@ def points(
         unit=np.concatenate(
             [np.tile([units.index(unit) for unit in m.units], len(m)) for m in equations.table.sets]
         )[present],
-        like=np.array(rows.like)[named.set_of],
+        like=np.array(rows.like)[equations.blocks.set_of],
         family=np.concatenate(families)[present],
         arc=arc,
         idle=idle,
@@ -282,19 +281,19 @@ def _each_unit(points: Points) -> Iterator[tuple[str, BoolArray]]:
 
 
 def families(
-    points: Points, named: Labels, good: BoolArray, odd: BoolArray, uncertainty: Uncertainty
+    points: Points, blocks: RowBlocks, good: BoolArray, odd: BoolArray, uncertainty: Uncertainty
 ) -> Iterator[HeldFamily]:
     """Return families of equations (M,) that were reached; `odd` (M,) are of outlying rows."""
     by_fit = points.by_fit(uncertainty)
 
     def rms(squares: FloatArray, of: BoolArray) -> float:
-        if not (count := len(np.unique(named.row[of]))):
+        if not (count := len(np.unique(blocks.row[of]))):
             return float("nan")
         return float(np.sqrt((squares / points.arc**2)[of].sum() / count))
 
     several = [(unit, mine) for unit, whole in _each_unit(points) if (mine := whole & good).any()]
     for unit, mine in several:
-        test = _test(points, named, mine, uncertainty)
+        test = _test(points, blocks, mine, uncertainty)
         yield HeldFamily(
             family=Family(unit),
             rms=rms(points.residual**2, mine),
@@ -305,7 +304,7 @@ def families(
 
 
 def _test(
-    points: Points, named: Labels, good: BoolArray, uncertainty: Uncertainty
+    points: Points, blocks: RowBlocks, good: BoolArray, uncertainty: Uncertainty
 ) -> HoldoutTest | None:
     """Test one family of the rows that were reached; None where its noise is not known."""
     own = points.own[good]
@@ -321,9 +320,9 @@ def _test(
     held = Lengths(
         points.residual[good] / unit,
         whole[good] / unit[:, None],
-        numbered(named.row[good]),
-        numbered(named.pose[good]),
-        named.component[good],
+        numbered(blocks.row[good]),
+        numbered(blocks.pose[good]),
+        blocks.component[good],
     )
     left = np.sqrt(1.0 - points.taken[good]) / unit
     by_actuator = points.by_actuator[good] * left[:, None]
@@ -355,7 +354,7 @@ def _fitted(uncertainty: Uncertainty, sets: IntArray, family: IntArray) -> tuple
 
     Of mixtures all equations, which are of all families in part.
     """
-    sandwich, named = uncertainty.covariance.sandwich, uncertainty.labels
+    sandwich, blocks = uncertainty.covariance.sandwich, uncertainty.blocks
     unit = np.zeros(len(uncertainty.fit.residual))
     if uncertainty.mixed:
         values = sandwich.residual
@@ -366,12 +365,12 @@ def _fitted(uncertainty: Uncertainty, sets: IntArray, family: IntArray) -> tuple
             unit[uncertainty.family_of(i, there)] = np.sqrt(uncertainty.noise_of_moving(i, there))
     mine = (unit > 0) & ~uncertainty.idle
     residual = values[mine] / unit[mine]
-    split = noise(residual, sandwich.retained[mine], numbered(uncertainty.fit.key[mine]))
+    split = noise(residual, sandwich.retained[mine], numbered(uncertainty.fit.key()[mine]))
     lengths = Lengths(
         residual,
         uncertainty.fit.design[mine],
-        numbered(named.row[mine]),
-        numbered(named.pose[mine]),
-        named.component[mine],
+        numbered(blocks.row[mine]),
+        numbered(blocks.pose[mine]),
+        blocks.component[mine],
     )
     return lengths, split

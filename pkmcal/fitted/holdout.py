@@ -14,12 +14,12 @@ from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.estimation import misfits
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.estimate import Estimate
-from pkmcal.estimation.estimator import LEAST_FREEDOM, Estimator
+from pkmcal.estimation.estimator import Estimator
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.fit_data import FitData
-from pkmcal.estimation.labels import labels
+from pkmcal.estimation.solving import LEAST_FREEDOM
 from pkmcal.estimation.uncertainty import Uncertainty
-from pkmcal.fitted.distances import Distances, distances
+from pkmcal.fitted.distances import NO_DISTANCES, Distances, distances
 from pkmcal.fitted.held_points import HeldFamily, families, odd_rows, points
 from pkmcal.fitted.later import Later, OwnNumbers, compared, later
 from pkmcal.measurements.measurements import Measurements
@@ -79,8 +79,8 @@ class HeldOut(ReadOnly):
     holdout_off: FloatArray = field(default_factory=lambda: np.empty(0))
     holdout_rows: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.intp))
     holdout_outliers: tuple[int, ...] = ()
-    holdout_distances_before: Distances = field(default_factory=Distances)
-    holdout_distances: Distances = field(default_factory=Distances)
+    holdout_distances_before: Distances = NO_DISTANCES
+    holdout_distances: Distances = NO_DISTANCES
     holdout_families: tuple[HeldFamily, ...] = ()
     holdout_later: Later | None = None
     holdout_end: Evaluation | None = None
@@ -183,16 +183,16 @@ def evaluate(
     rows, equations, (before, after), own = unfitted(
         held, estimator, estimate, uncertainty, nominal
     )
-    named = labels(equations)
-    seen = points(rows, equations, after, named, own, uncertainty)
-    row, count = named.row, len(equations.table.rows)
+    blocks = equations.blocks
+    seen = points(rows, equations, after, own, uncertainty)
+    row, count = blocks.row, len(equations.table.rows)
     off_before, off = (misfits.distances(equations, each) for each in (before, after))
     good = np.isfinite(off)
     expected = np.bincount(row, seen.own + seen.by_fit(uncertainty), count)
     spare = float((1.0 - seen.taken[good[row]]).sum()) if good.any() else float("nan")
     usable = uncertainty.known and spare >= LEAST_FREEDOM
     odd = good & odd_rows(seen, row, count, uncertainty)
-    judged = families(seen, named, good[row], odd[row], uncertainty) if usable else ()
+    judged = families(seen, blocks, good[row], odd[row], uncertainty) if usable else ()
     in_short = [distances(each, odd) for each in (off_before, off)]
     return HeldOut(
         holdout_rms_before=in_short[0].rms,

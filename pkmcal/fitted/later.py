@@ -14,12 +14,12 @@ import numpy as np
 from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.estimate import Estimate
+from pkmcal.estimation.estimator import Estimator
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.free_parameters import parameters
-from pkmcal.estimation.least_squares import Search
-from pkmcal.estimation.loss import Loss
 from pkmcal.estimation.mode_slips import in_their_modes, start_in_modes
+from pkmcal.estimation.other_starts import elsewhere
 from pkmcal.estimation.parameters import Parameters
 from pkmcal.estimation.pose_minima import in_least_minima
 from pkmcal.estimation.row_states import RowStates
@@ -143,26 +143,35 @@ def compared(
             near = in_least_minima(whole, whole.at(theta, noise, near), noise).onward
         return commanded, in_their_modes(commanded, commanded.at(theta, near=near)), None
     whole, start = whole.begin(start_in_modes(commanded, theta, rows.own, near))
-    found, own = _own_numbers(rows, whole, start, estimate, sure)
+    found, own, least = _own_numbers(rows, whole, start, estimate, sure)
+    for _ in range(len(theta)):  # of a mounting that may be either side up the one that fits
+        tried = [
+            _own_numbers(rows, whole, there, estimate, sure)
+            for there in elsewhere(whole, found, rows.own)
+        ]
+        better = min(tried, key=lambda each: each[2], default=(found, own, np.inf))
+        if not better[2] < least:
+            break
+        found, own, least = better
     commanded = whole.with_exact_actuators()
     return commanded, commanded.at(found.theta, near=found), own
 
 
 def _own_numbers(
     rows: Later, equations: Equations, start: Evaluation, estimate: Estimate, sure: Uncertainty
-) -> tuple[Evaluation, OwnNumbers]:
-    """The least squares of the rows' own parameters, all others held."""
+) -> tuple[Evaluation, OwnNumbers, float]:
+    """The least squares of the rows' own parameters, all others held; and these squares."""
     noise, columns = noise_factors(rows, equations, sure), np.flatnonzero(rows.own)
-    search = Search(equations, start, columns)
+    state, count = estimate.state, len(equations.blocks.components)
+    search = Estimator.of(equations, start, state.loss, columns)
     found, jacobian = start, np.zeros((0, len(columns)))
-    if len(equations.blocks.components):
-        loss = estimate.state.loss
-        width = np.full(len(equations.blocks.components), float(np.median(loss.width)))
-        same = Loss(loss.name, equations.blocks.components, width)
+    width = np.full(count, float(np.median(state.width)))
+    if count:
         none = np.zeros((0, len(columns)))
-        u, trail = search.best(search.begin(), np.zeros(len(columns)), noise, same, none)
-        found = search.at(trail, u, noise).here
+        best = search.best(np.zeros(len(columns)), noise, width, none)
+        found = best.at(best.u, noise).here
         jacobian = search.jacobian(found, noise)
+    squares = search.cost(found, noise, width)
     left, singular, right = np.linalg.svd(
         np.vstack([jacobian, search.prior(found.theta)]), full_matrices=False
     )
@@ -170,4 +179,4 @@ def _own_numbers(
     half, taken = right[kept].T / singular[kept], left[: len(jacobian), kept]
     by_all = equations.by_parameters(found, noise) * equations.parameters.scale
     by_fitted = rows.by_fitted(by_all, len(sure.fit.back))
-    return found, OwnNumbers(half, -half @ (taken.T @ by_fitted), noise)
+    return found, OwnNumbers(half, -half @ (taken.T @ by_fitted), noise), squares

@@ -90,7 +90,7 @@ def compared_by_poses(
         to say.
     """
     sure = fit.uncertainty
-    if sure.mixed or fit.estimate.state.loss.name != "linear" or not sure.known:
+    if sure.mixed or fit.estimate.state.loss != "linear" or not sure.known:
         return None
     equations, end = _with_effects(fit, effects) if effects else (sure.equations, fit.end)
     chosen = equations.parameters
@@ -99,15 +99,15 @@ def compared_by_poses(
         name not in fitted if lacking is None else name in lacking for name in chosen.names
     ])  # fmt: skip
     jacobian = equations.by_parameters(end, sure.factors) * chosen.scale
-    if not beside.any() or jacobian.shape[0] != len(sure.labels.pose):
+    if not beside.any() or jacobian.shape[0] != len(sure.blocks.pose):
         return None
     values = equations.residual(end, sure.factors)
     prior, known = chosen.prior_rows(end.theta), chosen.prior_left(end.theta)
-    pose = numbered(sure.labels.pose)
+    pose = numbered(sure.blocks.pose)
     if int(pose.max()) + 1 < LEAST_POSES:
         return None
     whole = leave_out(jacobian, values, prior, known, pose)
-    if sure.equations.blocks.unstated.all() and whole.deviation < 1.0:
+    if sure.blocks.unstated.all() and whole.deviation < 1.0:
         # the noise that the fit found is more than what the effect leaves: priors weigh less
         less = whole.deviation
         whole = leave_out(jacobian, values, less * prior, less * known, pose)
@@ -140,7 +140,7 @@ def effect_columns(fit: Fit, effects: Sequence[Effect | Changed]) -> Columns | N
 
 def _squares(fit: Fit, missed: FloatArray, pose: np.ndarray) -> FloatArray:
     """Sum of the squared lengths of each pose, mm²."""
-    length = fit.uncertainty.labels.length
+    length = fit.uncertainty.blocks.length
     off = np.where(length, fit.uncertainty.in_units(missed), 0.0)
     return np.bincount(pose, off**2).astype(np.float64)
 
@@ -164,8 +164,8 @@ def _comparison(
 ) -> Comparison | None:
     plain, whole, bare = squares
     good = np.isfinite(plain) & np.isfinite(whole)
-    labels = fit.uncertainty.labels
-    rows_of = [np.unique(labels.row[labels.length & (numbered(labels.pose) == k)]).size
+    blocks = fit.uncertainty.blocks
+    rows_of = [np.unique(blocks.row[blocks.length & (numbered(blocks.pose) == k)]).size
                for k in range(len(plain))]  # fmt: skip
     points = float(np.array(rows_of)[good].sum())
     if int(good.sum()) < LEAST_POSES or not points:

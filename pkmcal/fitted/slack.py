@@ -135,9 +135,7 @@ def _without_each(
     return gain, longer * np.sign(_slopes(equations, evaluation))[poses]
 
 
-def taut(
-    equations: Equations, commanded: Equations, start: Evaluation
-) -> tuple[Equations, tuple[Cell, ...]]:
+def taut(equations: Equations, start: Evaluation) -> tuple[Equations, tuple[Cell, ...]]:
     """The equations without cables that are slack, and which these are.
 
     One a pose and robust fit, until what is left agrees. A cable that turns out to be shorter than
@@ -151,7 +149,7 @@ def taut(
     if not _pulling(equations).any():
         return equations, ()
     for k in range(_ROUNDS):
-        estimator = estimator_at(equations, commanded, start, "cauchy")
+        estimator = estimator_at(equations, start, "cauchy")
         estimate = solved_in_least_minima(estimator)
         longer, _ = _longer(equations, estimate)
         kept = {key: cell for key, cell in cells.items() if longer[key] > -_TOO_SHORT}
@@ -161,7 +159,6 @@ def taut(
             break
         cells = found
         equations = equations.without_closures(list(cells), estimate.evaluation)
-        commanded = equations.with_exact_actuators()
     return equations, tuple(cells.values())
 
 

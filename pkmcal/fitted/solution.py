@@ -16,6 +16,8 @@ from pkmcal.estimation import misfits
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.identifiability import observability
+from pkmcal.estimation.mixed_noise import of_own_noises
+from pkmcal.estimation.solving import scaled_triangle
 from pkmcal.fitted.datum import NO_DATUM, Datum
 from pkmcal.fitted.distances import Distances, distances
 from pkmcal.fitted.fit import Fit
@@ -23,8 +25,10 @@ from pkmcal.fitted.holdout import HeldOut
 from pkmcal.fitted.nuisances import Nuisance
 from pkmcal.fitted.slack import SlackCable
 from pkmcal.kinematics.robot import Robot
+from pkmcal.result import read_only
 from pkmcal.statistics.noise import Split
 from pkmcal.statistics.prior_test import PriorTest
+from pkmcal.statistics.weighed import Weighed
 
 if TYPE_CHECKING:  # which brings its own; the module is of Python 3.13 and later
     from typing_extensions import TypeVar
@@ -71,7 +75,8 @@ class Solution(HeldOut, Generic[Machine]):
     values : ndarray
         Identified values (n,).
     start : ndarray
-        Values (n,) before the calibration.
+        Values (n,) before the calibration: nominal ones, and the frame, targets and other unknowns
+        of the readings that fit the nominal machine best.
     stderr : ndarray
         Standard deviations (n,); inf where neither measurements nor prior determine.
 
@@ -116,14 +121,14 @@ class Solution(HeldOut, Generic[Machine]):
         Unweighted; r is the distance of the measured from the predicted point, of a pose that of
         its position.
     rms_before : float
-        `rms` of the nominal machine, unknown frame and targets aligned with the readings.
+        `rms` at `start`.
     closure_rms : float
         How far the machine's own closures disagree at the poses found, mm of the actuators.
 
         NaN where poses follow from the actuators exactly: as many closures as free coordinates, and
         no `Measurements.actuator_sigma`.
     closure_rms_before : float
-        `closure_rms` of the nominal machine.
+        `closure_rms` at `start`.
     closures : ndarray
         How far off the worst closure at each pose is (K,), mm; NaN where they hold.
     actuator_noise : float
@@ -173,7 +178,8 @@ class Solution(HeldOut, Generic[Machine]):
     evaluations : int
         How often the forward kinematics of all rows were solved.
     history : tuple of float
-        Misfit rms in mm at the start and after each step of the search.
+        Misfit rms in mm at `start` and after each step of the search; where poses have unknowns,
+        with poses that fit best.
     prior_test : PriorTest or None
         Whether the measurements contradict the prior, where there is one.
     uncertainty_test : PriorTest or None
@@ -244,11 +250,15 @@ class Solution(HeldOut, Generic[Machine]):
     dropped_data: tuple[tuple[FitData, int], ...] = ()
     slack: tuple[SlackCable, ...] = ()
 
-    @cached_property
+    @property
     def observability(self) -> dict[str, float]:
         """Indices O1 … O5 of the scaled Jacobian, over the identifiable combinations."""
+        return dict(self._observability)
+
+    @cached_property
+    def _observability(self) -> dict[str, float]:
         estimate, poses = self.fit.estimate, len(self.fit.estimator.equations.table.actuators)
-        scaled = self.fit.estimator.scaled_triangle(estimate.evaluation)
+        scaled = scaled_triangle(self.fit.estimator, estimate.evaluation)
         return observability(scaled, poses, estimate.state.measured.rank)
 
     @cached_property
@@ -281,6 +291,22 @@ class Solution(HeldOut, Generic[Machine]):
         return self.fit.uncertainty.repeats(plain=True)
 
     @cached_property
+    def weighed(self) -> Weighed:
+        """The fit of which equations are equally uncertain and independent of each other.
+
+        Also where a stated sigma, or that of the actuators, is wrong of some of them: tests of
+        what the model misses rest on it. Outliers do not tell the noise.
+        """
+        sure = self.fit.uncertainty
+        system, blocks = sure.equations.system, sure.blocks
+        if system is None or blocks.unstated.all():
+            return sure.weighed
+        odd = np.isin(sure.equations.table.rows, self.outliers)
+        use = ~np.isin(sure.blocks.row, blocks.block_of_row[odd])
+        evaluation = self.fit.estimate.evaluation
+        return of_own_noises(*sure.tested_with_prior, system, evaluation, sure.factors, use)
+
+    @cached_property
     def distances_before(self) -> Distances:
         """Rms, median and 95 % quantile of the nominal machine's distances to fitted points, mm."""
         return self._distances(self.fit.start)
@@ -297,7 +323,7 @@ class Solution(HeldOut, Generic[Machine]):
     @property
     def loss(self) -> str:
         """The loss that was asked for."""
-        return self.fit.estimate.state.loss.name
+        return self.fit.estimate.state.loss
 
     @property
     def sessions(self) -> tuple[str, ...]:
@@ -308,7 +334,7 @@ class Solution(HeldOut, Generic[Machine]):
     def read(self) -> BoolArray:
         """Mask of fitted rows (N,) of which more is known than where the actuators were."""
         read: BoolArray = self.fit.equations.table.count > 0
-        return read
+        return read_only(read)
 
     @property
     def expansion(self) -> dict[str, float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
@@ -17,6 +18,7 @@ BY_MAP: dict[str, tuple[str, ...]] = {  # what can be wrong in a group
     "spherical": ("dphi", "dtheta", "dpsi"),
 }
 PARTS = ("", "b", "c")
+_ELSEWHERE = 1e-3  # mm: joints further from each other have a rod between them
 JointKind = Literal["R", "P", "U", "S", "C"]
 KINDS: dict[str, str] = {
     "R": "revolute", "P": "prismatic", "U": "universal", "S": "spherical", "C": "cylindrical",
@@ -109,6 +111,34 @@ def towards(limb: tuple[Joint, ...], k: int) -> FloatArray | None:
         length = float(np.linalg.norm(way))
         if length > 1e-9 * (1.0 + float(np.abs(at).max())):
             return way / length
+    return None
+
+
+def axes_along_rods(limb: tuple[Joint, ...], within: float) -> Iterator[tuple[int, str]]:
+    """Each axis of a U that lies along a rod beside it: the place of the U, and which axis it is.
+
+    Parameters
+    ----------
+    limb : tuple of Joint
+        A limb from its base to the platform.
+    within : float
+        Sine of the angle to the rod below which an axis lies along it.
+    """
+    for k, joint in enumerate(limb):
+        if joint.kind != "U":
+            continue
+        rods = [_rod(joint, limb[k + 1 :]), _rod(joint, limb[:k][::-1])]
+        for axis, ordinal in zip(joint.axes, ("first", "second"), strict=True):
+            if any(r is not None and np.linalg.norm(np.cross(axis, r)) < within for r in rods):
+                yield k, ordinal
+
+
+def _rod(joint: Joint, others: tuple[Joint, ...]) -> FloatArray | None:
+    """The direction (3,) to the first of other joints that is elsewhere and no slide."""
+    for other in others:
+        way = other.at - joint.at
+        if other.kind != "P" and np.linalg.norm(way) > _ELSEWHERE:
+            return np.asarray(way / np.linalg.norm(way))
     return None
 
 

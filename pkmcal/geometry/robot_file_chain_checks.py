@@ -17,9 +17,10 @@ from pkmcal.core.chains import (
 )
 from pkmcal.core.library import MAPS, MAX_LIMBS
 from pkmcal.files.toml_table import Table, shown
-from pkmcal.geometry.chain_joints import Joint
+from pkmcal.geometry.chain_joints import Joint, axes_along_rods
 from pkmcal.geometry.chains import Chains
 
+_ALONG = 1e-6  # sine of the angle between an axis and a rod that leaves the rod free to turn
 _IN_PLANE = 1e-6  # what an axis may be out of the plane
 
 
@@ -82,6 +83,11 @@ def _check_actuators(last: Table, chains: Chains) -> None:
 def _fail_dependent(table: Table, chains: Chains, i: int) -> NoReturn:
     """Refuse a limb whose passive joints do not follow from the pose of the platform alone."""
     limb = chains.limbs[i]
+    along = [
+        f"the {ordinal} axis of the U {chains.name_of(i, k)} lies along its rod, which it turns"
+        " about itself: give that U two axes across the rod"
+        for k, ordinal in axes_along_rods(limb, _ALONG)
+    ]
     remedy = "take home away from a dead point of the limb"
     if sum(joint.kind == "S" for joint in limb) > 1:
         remedy = "write one S of a rod as a U, or " + remedy
@@ -93,7 +99,7 @@ def _fail_dependent(table: Table, chains: Chains, i: int) -> NoReturn:
     table.fail(
         "joints",
         f"at home passive joints of limb {i + 1} can move while the platform stands still:"
-        f" {remedy}",
+        f" {'; '.join(along) or remedy}",
     )
 
 

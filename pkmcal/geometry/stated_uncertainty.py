@@ -22,7 +22,8 @@ from pkmcal.files.toml_table import Table
 COMMON, CONSIDER, SCALE = "common", "consider", "scale"
 LEAST, MOST = 1e-15, 1e15  # mm, rad or 1, of what a standard deviation may be
 Uncertain = Mapping[str, float | Mapping[str, float]] | None
-_BESIDE = re.compile(r"(frame|target|anchor|attachment|tool|mounting)[^@]*(@.*)?|scale")
+_POINTS = ("target", "anchor", "attachment")  # roles whose numbers have a name behind them
+_ROLES = (*_POINTS, "frame", "tool", "mounting")
 _QUANTITIES = {"mm": "lengths", "rad": "angles", "1": "ratios"}
 _UNITS_BESIDE = (
     {  # of what is no number of the geometry; all other points are lengths
@@ -47,11 +48,14 @@ class StatedUncertainty:
         Of one amount that all numbers have in common, of a point each coordinate.
     consider : mapping of str to float
         Of numbers that are not fitted along: deviations alone allow for them.
+    roles : tuple of str
+        What readings depend on beside frames, targets and the like: those of a user's own.
     """
 
     own: Mapping[str, float] = field(default_factory=dict)
     common: Mapping[str, float] = field(default_factory=dict)
     consider: Mapping[str, float] = field(default_factory=dict)
+    roles: tuple[str, ...] = ()
 
     def __bool__(self) -> bool:
         return bool(self.own or self.common or self.consider)
@@ -67,7 +71,22 @@ class StatedUncertainty:
             _behind(self.own, other.own),
             _behind(self.common, other.common),
             _behind(self.consider, other.consider),
+            (*self.roles, *other.roles),
         )
+
+    def of_geometry(self, pattern: str, names: Iterable[str]) -> bool:
+        """Return whether a pattern is of the geometry, not of frames, points or instruments."""
+        beside = rf"({'|'.join(map(re.escape, (*_ROLES, *self.roles)))})[^@]*(@.*)?|{SCALE}"
+        own = any(fnmatchcase(name, pattern) for name in names)
+        return own or not re.fullmatch(beside, pattern)
+
+    def alike(self, name: str) -> str:
+        """Return the kind, coordinate and session that numbers with a common error share."""
+        stem, _, behind = name.partition("@")
+        point, dot, axis = stem.partition(".")
+        roles = "|".join(map(re.escape, (*_POINTS, *self.roles)))
+        kind = re.sub(rf"^({roles}).+|\d+$", r"\1", point)
+        return f"{kind}{dot}{axis}@{behind}"
 
     def table(self) -> dict[str, Any]:
         """The statement as a robot file has it, and as `identify` takes it."""
@@ -124,11 +143,6 @@ def _behind(first: Mapping[str, float], later: Mapping[str, float]) -> dict[str,
     return {name: s for name, s in first.items() if name not in later} | dict(later)
 
 
-def of_geometry(pattern: str, names: Iterable[str]) -> bool:
-    """Return whether a pattern is of the geometry, not of frames, points or instruments."""
-    return any(fnmatchcase(name, pattern) for name in names) or not _BESIDE.fullmatch(pattern)
-
-
 def unit_of(pattern: str, names: Mapping[str, str]) -> str:
     """Unit of what a pattern matches: of the geometry by `names`, else by its own name.
 
@@ -176,7 +190,7 @@ def read_uncertainty(table: Table, geometry: _Named) -> StatedUncertainty:
     own = {key: value for key, value in table.data.items() if key not in parts}
     found = _deviations(Table(own, table.source, table.path, table.units), units)
     for name in [*found, *parts[COMMON], *parts[CONSIDER]]:
-        if of_geometry(name, geometry.names):
+        if NOTHING.of_geometry(name, geometry.names):
             try:
                 geometry.match(name)
             except ValueError as error:

@@ -37,6 +37,7 @@ from pkmcal.kinematics.robot import Robot
 from pkmcal.loading import load
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.tracker import Tracker
+from pkmcal.progress import Progress, within
 from pkmcal.readings.unknowns import POINT
 from pkmcal.statistics.covariance import RULES
 
@@ -116,15 +117,19 @@ def read(job: Calibration, inputs: Inputs, tell: Tell) -> Sources:
     )
 
 
-def identified(sources: Sources, arguments: dict[str, Any]) -> Identification:
+def identified(
+    sources: Sources, arguments: dict[str, Any], progress: Progress | None = None
+) -> Identification:
     """Identify; what `identify` warns of is in the summary."""
+    first = within(progress, 0.0, 0.5) if sources.relative else progress
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)
-        found = identify(sources.robot, **arguments)
+        found = identify(sources.robot, **arguments, progress=first)
         noise = found.chi2_per_dof**0.5
         if not sources.relative or not (math.isfinite(noise) and noise > 0.0):
             return found
-        return identify(sources.robot, **_with_noise(arguments, noise))
+        second = within(progress, 0.5, 1.0)
+        return identify(sources.robot, **_with_noise(arguments, noise), progress=second)
 
 
 def _with_noise(arguments: dict[str, Any], noise: float) -> dict[str, Any]:

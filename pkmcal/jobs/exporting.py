@@ -18,9 +18,8 @@ from pkmcal.exceptions import ArgumentError
 from pkmcal.jobs.configuration import Exporting
 from pkmcal.jobs.inputs import Inputs
 from pkmcal.jobs.output import Output
-from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.kinematics.robot import Robot
-from pkmcal.loading import load, load_parallel
+from pkmcal.loading import load
 
 
 @dataclass(frozen=True)
@@ -64,23 +63,13 @@ def run(job: Exporting, inputs: Inputs, force: bool) -> Exported:
     if job.out is None:
         raise ArgumentError("--out: where to write is missing")
     out = Path(job.out)
-    machine = _machine(job.robot, target, inputs)
+    machine = load(inputs.robot(job.robot))
     if job.config is not None:
         given["config"] = inputs.file(job.config)
     if given.get("number") not in (None, "double", "float"):
         raise ArgumentError(f"--number must be double or float, found {job.number!r}")
     write = _folder if target.folder else _file
     return Exported(machine.name, write(target, machine, out, given, inputs, force), target.said)
-
-
-def _machine(robot: str, target: Target, inputs: Inputs) -> Robot | SerialArm:
-    """The machine, one that the target takes."""
-    if target.takes == "parallel":
-        return load_parallel(inputs.robot(robot))
-    machine: Robot | SerialArm = load(inputs.robot(robot))
-    if target.takes == "arm" and as_machine(machine).kind != "arm":
-        raise ArgumentError(f"{robot}: --as {target.name} is for serial arms")
-    return machine
 
 
 def _file(

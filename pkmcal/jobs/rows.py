@@ -11,14 +11,25 @@ from pkmcal.exceptions import ArgumentError
 from pkmcal.files.number_text import typed
 
 
-def numbers_on_line(what: str, text: str, units: Sequence[str], rad: bool) -> FloatArray | None:
-    """Return the numbers of one row (1, n) in mm and rad; None for the name of a file."""
+def numbers_on_line(
+    what: str, text: str, units: Sequence[str], rad: bool, names: Sequence[str] = ()
+) -> FloatArray | None:
+    """Return the numbers of one row (1, n) in mm and rad; None for the name of a file.
+
+    Names of the numbers are for a row of too few.
+    """
     try:
         row = np.array([typed(part) for part in text.split(",")])
     except ValueError:
         return None
     if len(row) != len(units):
-        raise ArgumentError(f"{what} {text}: {len(row)} numbers, the machine has {len(units)}")
+        missing = [text.strip(), *["0"] * (len(units) - len(row))]
+        expected = ""
+        if names and len(row) < len(units):
+            expected = f": {' '.join(names)}, such as {','.join(missing)}"
+        raise ArgumentError(
+            f"{what} {text}: {len(row)} numbers, the machine has {len(units)}{expected}"
+        )
     if not np.isfinite(row).all():
         raise ArgumentError(f"{what} {text}: the numbers must be finite")
     if not rad:

@@ -65,8 +65,8 @@ class ArmMachine:
     def __init__(self, arm: SerialArm) -> None:
         self.arm = arm
         self.name, self.length = arm.name, arm.length
-        self.n_actuators, self.actuator_units = arm.n_joints, arm.actuator_units
-        self.joint_names = arm.joint_names
+        self.n_actuators, self.actuator_units = arm.n_actuators, arm.actuator_units
+        self.actuator_names = arm.actuator_names
         self.geometry = arm_geometry(arm.joint_errors, arm.laws)
         self.model = ArmModel(self.geometry.names[: 6 * arm.n_joints], arm.uncertainty)
         self.home = screws.pose(arm.home.reshape(1, 16))[0]
@@ -87,7 +87,7 @@ class ArmMachine:
 
     def replace(self, changes: FloatArray) -> ArmMachine:
         """Return the arm with other joint errors (6 n,) and numbers of joint laws, mm and rad."""
-        of_joints = 6 * self.n_actuators
+        of_joints = 6 * self.arm.n_joints
         arm = self.arm.replace(changes[:of_joints].reshape(-1, 6))
         if arm.laws is not None:
             arm = arm.with_laws(arm.laws.with_values(changes[of_joints:]))

@@ -1,4 +1,4 @@
-"""The interface of the kinematics of limbs, which each kind of them answers in its own module."""
+"""The interface of the kinematics of limbs, which the module of each kind of them answers."""
 
 from __future__ import annotations
 

@@ -27,9 +27,8 @@ from pkmcal.geometry.carried import Load
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.model import Model
 from pkmcal.geometry.yielding import carrying, yielding
-from pkmcal.kinematics.closed_form import ClosedForm
+from pkmcal.kinematics import closed_form, joint_chains
 from pkmcal.kinematics.complete import completed
-from pkmcal.kinematics.joint_chains import JointChains
 from pkmcal.kinematics.kinematics import Kinematics, Match
 from pkmcal.kinematics.limb_kinematics import LimbKinematics
 from pkmcal.kinematics.limits import Feasibility
@@ -181,10 +180,10 @@ class Robot(Kinematics, Result):
         arrays = {f.name: getattr(found, f.name) for f in fields(Feasibility) if f.name != "tail"}
         return replace(found, **{k: a.reshape((*shape, *a.shape[1:])) for k, a in arrays.items()})
 
-    @cached_property
+    @property
     def limb_kinematics(self) -> LimbKinematics:
         """The kinematics of its limbs, as their kind answers for them."""
-        return ClosedForm() if self.model.chains is None else JointChains(self.model.chains)
+        return closed_form if self.model.chains is None else joint_chains
 
     def within(self, ends: box.Box) -> Robot:
         """The robot with a smaller workspace: coordinates with their ends, mm and rad.
@@ -470,7 +469,7 @@ class Robot(Kinematics, Result):
         ValueError
             An unknown or tied name, a value that is not finite, a wrong shape.
         """
-        return Robot(replace(self.model, geometry=self.geometry.replace(changes)))
+        return Robot(self.model.with_geometry(self.geometry.replace(changes)))
 
     def with_values(self, values: FloatArray) -> Robot:
         """`replace` for the steps of a search: three times as fast, for numbers near these.

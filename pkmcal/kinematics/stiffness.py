@@ -209,7 +209,7 @@ def stiffness(
     if point_shape != ():
         raise ArgumentError(f"at must have shape (3,), found {point_shape}")
     if isinstance(carrying, SerialArm):
-        rows, shape = as_rows("poses", poses, carrying.n_joints)
+        rows, shape = as_rows("poses", poses, carrying.n_actuators)
         twists, compliance, turned = _of_arm(carrying, rows)
     else:
         rows, shape = as_rows("poses", poses, 6)
@@ -239,7 +239,7 @@ def _of_arm(arm: SerialArm, theta: FloatArray) -> tuple[FloatArray, FloatArray, 
         for term, value in arm.joint_laws.numbers.items()
         if term.kind == "compliance"
     }
-    twists = arm.rigid.jacobian(arm.joint_laws.moved(theta), frame="tip")[..., [*yields]]
+    twists = arm.joint_jacobian(theta, frame="tip")[..., [*yields]]
     compliance = np.tile(list(yields.values()), (len(theta), 1))
     return twists, compliance, arm.forward(theta)[:, :3, :3]
 
@@ -319,7 +319,7 @@ def compliance_table(
     """
     _require_yielding(robot)
     limit = number("rated", rated, above=0.0)
-    size = robot.n_joints if isinstance(robot, SerialArm) else 6
+    size = robot.n_actuators if isinstance(robot, SerialArm) else 6
     rows, shape = as_rows("pose", pose, size)
     if shape != ():
         raise ArgumentError(f"pose must have shape ({size},), found {np.shape(pose)}")

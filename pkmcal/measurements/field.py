@@ -11,17 +11,19 @@ import dataclasses
 import re
 from collections.abc import Collection, Iterator, Sequence
 from functools import cache
+from pkgutil import resolve_name
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pkmcal.arguments import words
+from pkmcal.arguments import kind, words
 from pkmcal.arrays import FloatArray, Int64Array
-from pkmcal.exceptions import ArgumentError
+from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.files.column_names import known_as
 from pkmcal.files.csv_table import Table
 from pkmcal.files.csv_writer import WrittenColumn
+from pkmcal.readings.own_methods import watch
 from pkmcal.readings.reading import Reading
 from pkmcal.readings.rows import numbers
 
@@ -59,6 +61,7 @@ class Field:
             raise TypeError(f"{cls.__name__}: has columns of its own, and no method read for them")
         if cls.kept is Field.kept:
             raise TypeError(f"{cls.__name__}: has no method kept, which checks what is given")
+        watch(cls, Field)
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name
@@ -79,6 +82,27 @@ class Field:
             What does not fit; the message names the argument.
         """
         raise NotImplementedError
+
+    def checked(self, given: Any, m: Any) -> Any:
+        """What `kept` makes of what the caller gave, if it is an array with an entry for each row.
+
+        Raises
+        ------
+        TypeError
+            It is none.
+        """
+        if given is None:
+            return None
+        found = self.kept(given, m)
+        if not isinstance(found, np.ndarray) or found.shape[:1] != (len(m),):
+            seen = f"shape {found.shape}" if isinstance(found, np.ndarray) else kind(found)
+            raise ArgumentTypeError(
+                f"{self.name}: kept of the class {type(self).__name__} must return an array with an"
+                f" entry for each of {len(m)} rows; found {seen}"
+            )
+        if hasattr(given, "__array__") and np.may_share_memory(found, np.asarray(given)):
+            return found.copy()  # the caller may write to his
+        return found
 
     def of(self, m: Any) -> Any:
         """The array of some measurements, or None."""
@@ -104,6 +128,25 @@ class Field:
         if self.of(m) is not None:
             yield WrittenColumn(self.name, self.unit or "", self.of(m))
 
+    def written(self, m: Any, units: Sequence[str]) -> list[WrittenColumn]:
+        """The field's columns, if a file with them is read as one that has the field.
+
+        Raises
+        ------
+        TypeError
+            One of another name than the field's, of a class that has no `names`.
+        """
+        columns = list(self.columns(m, units))
+        if self.named or type(self).names is not Field.names:
+            return columns
+        for name in (column.name for column in columns):
+            if name != self.name:
+                raise ArgumentTypeError(
+                    f"{self.name}: columns of the class {type(self).__name__} writes {name!r}: the"
+                    " class needs a method names that states it, or it would not be read back"
+                )
+        return columns
+
     def framed(self, m: Any) -> Iterator[WrittenColumn]:
         """Return the field's columns in a data frame."""
         return self.columns(m, m.actuator_units or ("mm",) * m.actuators.shape[1])
@@ -123,7 +166,25 @@ Fields = tuple[Field, ...]
 def row_fields(measurements: type) -> Fields:
     """The fields that a class of measurements has, in the order of its attributes."""
     every = (each.default for each in dataclasses.fields(measurements))
-    return tuple(each for each in every if isinstance(each, Field))
+    return read_back(tuple(each for each in every if isinstance(each, Field)))
+
+
+@cache
+def read_back(fields: Fields) -> Fields:
+    """The fields, if each is read from the column that it writes.
+
+    Raises
+    ------
+    TypeError
+        One whose column files have as another name for something else.
+    """
+    for each in fields:
+        if type(each).read is Field.read and (meant := known_as(each.name)) != each.name:
+            raise TypeError(
+                f"{type(each).__name__}: files have its column {each.name!r} as another name for"
+                f" {meant!r}; give the field another name"
+            )
+    return fields
 
 
 @cache
@@ -155,9 +216,12 @@ def require_other_columns(reading: type[Reading], fields: Fields) -> None:
             )
 
 
-def declared(field: Field) -> Any:
-    """The default of an attribute of the class, which is the field itself."""
-    return field
+def declared(field: str) -> Any:
+    """The default of an attribute of the class: the field itself, an object of "module:Class".
+
+    Modules are those of `pkmcal.measurements`.
+    """
+    return resolve_name(f"pkmcal.measurements.{field}")()
 
 
 def row_numbers(name: str, given: ArrayLike, rows: int, blank: bool = False) -> FloatArray:

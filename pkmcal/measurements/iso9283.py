@@ -17,7 +17,6 @@ from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError
 from pkmcal.result import Result
 
-REPEATS = 30  # what the standard asks for at each pose
 SIGMAS = 3.0  # of the spread, which the standard adds to the mean
 _PAIRED = 300  # poses between which distances are taken, at most
 

@@ -83,6 +83,33 @@ def join(table: Table, log: Table, how: Join, shift: int = 0, fields: Sequence[F
     raise FileError(f"{table.path}: cannot be joined with {log.path}; {'; '.join(refused)}")
 
 
+def rows_after(table: Table, shift: int) -> None:
+    """Give each row of a file the actuators of the row `shift` after it, or before it; a note.
+
+    Raises
+    ------
+    ValueError
+        A file without actuators.
+    """
+    actuators = actuators_in(table)
+    if not actuators:
+        raise table.header_error(f"no actuators to be taken from another row{_columns(table)}")
+    rows = [_within(i, shift, len(table)) for i in range(len(table))]
+    lines = [str(table.lines[i]) for i, row in enumerate(rows) if row is None]
+    columns = {
+        name: table.columns[name].take([row for row in rows if row is not None])
+        for name in actuators
+    }
+    table.take([i for i, row in enumerate(rows) if row is not None])
+    for name, column in columns.items():
+        table.put(name, column)
+    listed = ", ".join(lines[:_LISTED]) + (", …" if len(lines) > _LISTED else "")
+    table.notes.append(
+        f"actuators are those of the row {abs(shift)} {'after' if shift > 0 else 'before'} each;"
+        f" without one, left out: line{'s' * (len(lines) > 1)} {listed}"
+    )
+
+
 def _within(row: int | None, shift: int, count: int) -> int | None:
     return row + shift if row is not None and 0 <= row + shift < count else None
 
@@ -254,6 +281,7 @@ def _relative(table: Table) -> bool:
 def _by_row(table: Table, log: Table) -> tuple[Rows, str] | str:
     if len(table) == len(log):
         return list(range(len(log))), f"{len(log)} rows in the same order"
+    counted = ""
     for name in ("group", "name", "target"):
         if name not in table.columns:
             continue
@@ -264,13 +292,16 @@ def _by_row(table: Table, log: Table) -> tuple[Rows, str] | str:
         if len(order) == len(log):
             what = f"{len(log)} poses of {table.columns[name].name!r} in the same order"
             return [order[pose] for pose in poses], what
+        if len(order) < len(table) and not counted:
+            counted = f" of {len(order)} poses by {table.columns[name].name!r}"
     if "target" in table.columns and len(table) % len(log) == 0:
         cells = table.columns["target"].cells
         each = len(table) // len(log)
         if all(cells[i] == cells[i % each] for i in range(len(cells))) and len(set(cells)) == each:
             what = f"{each} targets for each of its {len(log)} rows, in the same order"
             return [i // each for i in range(len(cells))], what
-    return f"{len(table)} and {len(log)} rows"
+    mine = f"{len(table)} rows{counted}" if counted else f"{len(table)}"
+    return f"{mine} and {len(log)} rows"
 
 
 def _columns(table: Table) -> str:

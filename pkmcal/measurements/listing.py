@@ -9,7 +9,7 @@ import numpy as np
 
 from pkmcal import display
 from pkmcal.display import Table
-from pkmcal.files.csv_writer import WrittenColumn, numbered
+from pkmcal.files.csv_writer import WrittenColumn, numbered, with_cells
 from pkmcal.measurements.field import row_fields
 from pkmcal.measurements.sigma import deviations
 
@@ -51,11 +51,12 @@ def _columns(m: Any, units: Sequence[str] | None) -> Iterator[tuple[WrittenColum
     units = units or m.actuator_units or ("",) * m.actuators.shape[1]
     for column in numbered("", units, m.actuators):
         yield column._replace(name=column.name[1:]), None
-    for column in m.instrument.columns(units):
+    for column in with_cells(m.instrument.columns(units), len(m), m.instrument):
         yield column, None
     sigmas = deviations(m)
     values = m.values.reshape(len(m), -1)
-    for i, column in enumerate(m.instrument.value_columns(values)):
+    shown = m.instrument.value_columns(values)
+    for i, column in enumerate(with_cells(shown, len(m), m.instrument)):
         yield column, None if sigmas is None else float(sigmas[:, i].min())
     for field in row_fields(type(m)):
         for column in field.printed(m):

@@ -65,7 +65,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from os import PathLike
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -79,20 +79,17 @@ from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.kinematics.reading_units import Actuated
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.actuator_columns import actuators_in, compare, read_actuators
-from pkmcal.measurements.field import row_fields
 from pkmcal.measurements.inverted import inverted, turned_round
 from pkmcal.measurements.join import join as joined
-from pkmcal.measurements.join import way_and_shift
+from pkmcal.measurements.join import rows_after, way_and_shift
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.plane_columns import fill_in
 from pkmcal.measurements.probe import (
     agreement,
-    apart_from,
     is_of_a_flat,
-    is_of_trigger,
-    offset_of,
-    probed,
 )
+from pkmcal.measurements.probe_table import read_probe
+from pkmcal.measurements.table_fields import FIELDS, notes_of, read_fields
 from pkmcal.measurements.table_layout import (
     OWN_ORDER,
     Layout,
@@ -111,7 +108,6 @@ from pkmcal.readings.reading import Reading
 from pkmcal.readings.registry import KINDS
 
 _AXES = ("x", "y", "z")
-_FIELDS = row_fields(Measurements)
 _TRIED = 200  # rows by which an order of angles is told
 
 
@@ -149,7 +145,8 @@ def read_measurements(
     join : {"auto", "name", "row", "time", "row+1", "row-1", ...}
         How a row of the log is found: by the name of the point or of its pose, by the order of
         the rows, by time-stamp (the last row at or before it). By default the first that works of
-        name, time and row.
+        name, time and row. With "row+1" also of a file that has its own actuators: those of each
+        row are the ones that stand a row after it.
     ignore : str or sequence of str
         Headings of columns to leave out, or wildcards.
     rename : mapping of str to str, optional
@@ -199,7 +196,7 @@ def read_measurements(
             f"robot must be a Robot or SerialArm, found {arguments.shown(robot)}"
         )
     how = layout(ignore, rename, header, units)
-    joints: Sequence[str] = getattr(robot, "joint_names", None) or ()
+    joints: Sequence[str] = getattr(robot, "actuator_names", None) or ()
     table = _table(path, controller, join, how, joints)
     split_names(table)
     number_groups(table)
@@ -212,12 +209,12 @@ def read_measurements(
     several = several_targets(table, points)
     leave_out_unknown(table, _known(table, several, readings, points), SYNONYMS)
     if not table.columns.keys().isdisjoint(("probe", "contact")):
-        return _read_probe(table, robot, probe_offset)
+        return read_probe(table, robot, probe_offset)
     actuators, units = read_actuators(table, robot)
     compare(table, units, robot)
     fill_in(table, robot, several)
     read = with_constants(_reading(table, several, readings, kind), table).read(table, units)
-    fields = _read_fields(table, read, units)
+    fields = read_fields(table, read, units)
     values: FloatArray | None
     if several:
         actuators, values, fields = read_several(table, several, actuators, fields, points)
@@ -232,7 +229,7 @@ def read_measurements(
             values,
             read,
             actuator_units=units,
-            notes=_notes(table),
+            notes=notes_of(table),
             understood=table.understood(),
             file=table.path.name,
             **fields,
@@ -249,72 +246,8 @@ def read_measurements(
                 "z taken as the measured height of the nozzle, up; what a firmware reported when"
                 " its probe triggered has the opposite sign and is called probe"
             )
-        measured = replace(measured, notes=_notes(table))
+        measured = replace(measured, notes=notes_of(table))
     return measured
-
-
-def _notes(table: Table) -> tuple[str, ...]:
-    return (*table.elsewhere, *(f"{table.path}: {note}" for note in table.notes))
-
-
-def _read_fields(table: Table, read: Reading, units: Sequence[str]) -> dict[str, Any]:
-    """Fields of the rows that a table states."""
-    return {each.name: each.read(table, read, units) for each in _FIELDS}
-
-
-def _read_probe(table: Table, robot: Actuated | None, offset: ArrayLike | None) -> Measurements:
-    """Heights of a probe's tip where it triggered: 0, on the bed."""
-    what = "probe" if "probe" in table.columns else "contact"
-    if not isinstance(robot, Robot):
-        raise table.header_error(
-            f"column {table.columns[what].name!r}: give the robot, as the firmware had it when"
-            " it probed"
-        )
-    try:
-        found = offset_of(robot, offset, "probe_offset")
-    except ValueError as error:
-        raise FileError(f"{table.path}: {error}") from None
-    shown = ", ".join(f"{value:g}" for value in found)
-    source = "the robot file" if offset is None else "--probe-offset"
-    used = f"its offset is {shown} mm, of {source}"
-    if what == "contact":
-        table.notes.append(f"the firmware says where the nozzle would touch the bed; {used}")
-        places = table.stacked(["x", "y", "contact"], ["mm", "mm", "mm"])
-        return _probed(table, robot, places - found * [1.0, 1.0, -1.0], found)
-    z = table.numbers("probe", "mm")[0]
-    if actuators_in(table):
-        actuators, units = read_actuators(table, robot)
-        compare(table, units, robot)
-        if not is_of_trigger(robot, actuators, z):
-            row = int(np.argmax(apart_from(robot, actuators, z)))
-            at = robot.forward(actuators[row]).pose[2]
-            raise table.cell_error(
-                "probe",
-                row,
-                f"the robot file gives z = {at:.4g} mm at the actuators of this row, found"
-                f" {z[row]:.4g}: they have to be those at which the probe triggered",
-            )
-        poses = robot.forward(actuators).pose[:, :3]
-    else:
-        poses = np.column_stack([table.stacked(["x", "y"], ["mm", "mm"]), z])
-    table.notes.append(
-        f"{table.columns['probe'].name!r} taken as the firmware's z when the probe triggered: the"
-        f" actuators are those that the robot file has there, and the probe's tip is at 0; {used}"
-    )
-    return _probed(table, robot, poses, found)
-
-
-def _probed(table: Table, robot: Robot, points: FloatArray, offset: FloatArray) -> Measurements:
-    try:
-        measured = probed(robot, points, offset=offset)
-        fields = _read_fields(table, measured.instrument, robot.actuator_units)
-        given = {name: value for name, value in fields.items() if value is not None}
-        measured = replace(measured, notes=_notes(table), understood=table.understood())
-        return replace(measured, file=table.path.name, **given)
-    except FileError:
-        raise
-    except ValueError as error:
-        raise FileError(f"{table.path}: {error}") from None
 
 
 def _table(
@@ -327,7 +260,10 @@ def _table(
     """The table of a file, with the actuators of a controller's log."""
     way, shift = way_and_shift(join)
     if controller is None:
-        return open_table(path, columns, joints)
+        table = open_table(path, columns, joints)
+        if shift:
+            rows_after(table, shift)
+        return table
     log_columns = replace(columns, header=())
     seen = (*columns.ignore, *columns.rename)
     table = open_table(path, columns, joints, seen, elsewhere=True)
@@ -338,7 +274,7 @@ def _table(
     for name in seen:
         if not any(_has(each, name) for each in (table, log)) and name not in columns.ignore:
             raise table.header_error(f"no column {name!r} to rename, nor in {log.path}")
-    joined(table, log, way, shift, _FIELDS)
+    joined(table, log, way, shift, FIELDS)
     return table
 
 
@@ -355,10 +291,10 @@ def _known(
     names = {*actuators, "probe", "contact", *ANGLES, *orientation_in(table.columns)}
     names |= {f"{point}.{axis}" for point in (*points, *several) for axis in _AXES}
     for reading in readings:
-        names |= reading.names(table) | headings_of_constants(reading)
-    for field in _FIELDS:
+        names |= {*reading.names(table)} | headings_of_constants(reading)
+    for field in FIELDS:
         names |= field.names(actuators, components)
-    named = {field.name for field in _FIELDS if field.named}
+    named = {field.name for field in FIELDS if field.named}
     return names | {name for name in table.columns if name.partition(".")[0] in named}
 
 

@@ -15,13 +15,10 @@ from pkmcal.arguments import checked_seed, shown, words
 from pkmcal.arrays import FloatArray, Int64Array, TextArray
 from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError
+from pkmcal.files.csv_writer import with_cells
 from pkmcal.files.understood import Understood
 from pkmcal.kinematics.drive_state import DriveState
 from pkmcal.kinematics.reading_units import Actuated
-from pkmcal.measurements.actuator_sigma import ActuatorSigma
-from pkmcal.measurements.approach import Approach
-from pkmcal.measurements.beside import Beside
-from pkmcal.measurements.carried_load import CarriedLoad
 from pkmcal.measurements.field import (
     declared,
     require_other_columns,
@@ -32,17 +29,13 @@ from pkmcal.measurements.field import (
 from pkmcal.measurements.former import OF_MEASUREMENTS, adapted
 from pkmcal.measurements.listing import table, title
 from pkmcal.measurements.measurement_writer import write_measurements
-from pkmcal.measurements.numbering import Group, Lines, PoseName
 from pkmcal.measurements.poses import pose_index
-from pkmcal.measurements.session import Session
-from pkmcal.measurements.sigma import Sigma
-from pkmcal.measurements.targets import TargetIndex, checked_target, names_of_targets
-from pkmcal.measurements.temperature import Temperature
-from pkmcal.measurements.tension import Tension, TensionSigma, filled_tension
-from pkmcal.measurements.time_stamps import Time
+from pkmcal.measurements.targets import checked_target, names_of_targets
+from pkmcal.measurements.tension import filled_tension
 from pkmcal.measurements.tracker import Tracker
+from pkmcal.readings.components import names_of
 from pkmcal.readings.constants import columns_of_constants
-from pkmcal.readings.reading import Reading, names_of
+from pkmcal.readings.reading import Reading
 from pkmcal.readings.registry import Kind, as_reading, stated
 from pkmcal.readings.rows import numbers
 from pkmcal.result import Result
@@ -167,20 +160,20 @@ class Measurements(Result):
     notes: tuple[str, ...] = ()
     understood: tuple[Understood, ...] = ()
     # fields of the rows, in the order of their columns in files
-    actuator_sigma: FloatArray | None = declared(ActuatorSigma())
-    sigma: FloatArray | None = declared(Sigma())
-    target_index: Int64Array | None = declared(TargetIndex())
-    group: Int64Array | None = declared(Group())
-    pose_name: TextArray | None = declared(PoseName())
-    session: TextArray | None = declared(Session())
-    temperature: FloatArray | None = declared(Temperature())
-    time: FloatArray | None = declared(Time())
-    approach: FloatArray | None = declared(Approach())
-    tension: FloatArray | None = declared(Tension())
-    tension_sigma: FloatArray | None = declared(TensionSigma())
-    load: FloatArray | None = declared(CarriedLoad())
-    beside: Any = declared(Beside())
-    lines: Int64Array | None = declared(Lines())
+    actuator_sigma: FloatArray | None = declared("actuator_sigma:ActuatorSigma")
+    sigma: FloatArray | None = declared("sigma:Sigma")
+    target_index: Int64Array | None = declared("targets:TargetIndex")
+    group: Int64Array | None = declared("numbering:Group")
+    pose_name: TextArray | None = declared("numbering:PoseName")
+    session: TextArray | None = declared("session:Session")
+    temperature: FloatArray | None = declared("temperature:Temperature")
+    time: FloatArray | None = declared("time_stamps:Time")
+    approach: FloatArray | None = declared("approach:Approach")
+    tension: FloatArray | None = declared("tension:Tension")
+    tension_sigma: FloatArray | None = declared("tension:TensionSigma")
+    load: FloatArray | None = declared("carried_load:CarriedLoad")
+    beside: Any = declared("beside:Beside")
+    lines: Int64Array | None = declared("numbering:Lines")
 
     # The types above are those of the attributes; anything array-like is taken.
     def __init__(
@@ -228,15 +221,15 @@ class Measurements(Result):
             "understood": tuple(understood),
         })  # fmt: skip
         for each in of_rows:
-            given = rowwise[each.name]
-            self.__setstate__({each.name: None if given is None else each.kept(given, self)})
+            self.__setstate__({each.name: each.checked(rowwise[each.name], self)})
         self.__setstate__({"target": checked_target(place, self)})
         self.__setstate__({"target_names": names_of_targets(target_names, self)})
 
     def __setstate__(self, fields: dict[str, Any]) -> None:
         for name, value in fields.items():
-            if isinstance(value, np.ndarray):
-                value.setflags(write=False)
+            for part in vars(value).values() if isinstance(value, Reading) else (value,):
+                if isinstance(part, np.ndarray):
+                    part.setflags(write=False)
             object.__setattr__(self, name, value)
 
     def __len__(self) -> int:
@@ -442,7 +435,7 @@ class Measurements(Result):
         columns |= dict(zip(self.components, values.T, strict=True))
         units = self.actuator_units or ("",) * self.actuators.shape[1]
         of_instrument = (
-            *self.instrument.columns(units),
+            *with_cells(self.instrument.columns(units), len(self), self.instrument),
             *columns_of_constants(self.instrument, len(self)),
         )
         columns |= {each.name: each.values for each in of_instrument}

@@ -40,6 +40,10 @@ class PoseName(Field):
         """Check names (N,)."""
         return names(self.name, given, len(m))
 
+    def read(self, table: Table, instrument: Reading, units: Sequence[str]) -> TextArray | None:
+        """Read names beside which a table has got their numbers, the `Group`."""
+        return np.array(table.texts(self.name)) if self.name in table.columns else None
+
 
 class Lines(Field):
     """The line of each row in the file it was read from; no column states it."""

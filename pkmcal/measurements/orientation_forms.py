@@ -124,7 +124,9 @@ def _told_by(
                 )
                 return best
             listed = " and ".join(f"{word} ({_deg(off[word])})" for word in alike[:4])
-            hint = f"state how with --rotation; this machine is fitted by {listed}"
+            hint = f"this machine is fitted by {listed}: --rotation {alike[0]}"
+            if len(alike) > 1:
+                hint = f"this machine is fitted by {listed}: state which with --rotation"
     raise table.header_error(f"columns {said}: {what}; {hint}")
 
 

@@ -25,7 +25,8 @@ def pose_index(
     >>> pose_index(np.array([home, other, home, near]), (), np.array([1, 2, 3, 2])).tolist()
     [0, 1, 0, 1]
     """
-    places = np.hstack([actuators, *(each for each in driven if each is not None)])
+    parts = [actuators, *(each for each in driven if each is not None)]
+    places = parts[0] if len(parts) == 1 else np.hstack(parts)
     pose = np.unique(places, axis=0, return_inverse=True)[1].reshape(-1)
     if group is not None:
         pose = joined(np.unique(group, return_inverse=True)[1].reshape(-1), pose)

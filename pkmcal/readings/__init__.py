@@ -7,6 +7,8 @@ from pkmcal.readings.angles import Angle as Angle
 from pkmcal.readings.boards import Board as Board
 from pkmcal.readings.camera import Camera as Camera
 from pkmcal.readings.closure import Closure as Closure
+from pkmcal.readings.dependences import always as always
+from pkmcal.readings.dependences import point as point
 from pkmcal.readings.distances import Between as Between
 from pkmcal.readings.distances import Distance as Distance
 from pkmcal.readings.distances import RelativeDistance as RelativeDistance
@@ -21,6 +23,5 @@ from pkmcal.readings.turnings import Orientation as Orientation
 from pkmcal.readings.turnings import Pose as Pose
 from pkmcal.readings.turnings import Tilt as Tilt
 from pkmcal.readings.unknowns import Dependence as Dependence
+from pkmcal.readings.unknowns import Nature as Nature
 from pkmcal.readings.unknowns import Start as Start
-from pkmcal.readings.unknowns import always as always
-from pkmcal.readings.unknowns import point as point

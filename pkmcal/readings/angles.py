@@ -16,11 +16,13 @@ from pkmcal.exceptions import ArgumentError
 from pkmcal.files.csv_table import Table
 from pkmcal.files.csv_writer import WrittenColumn
 from pkmcal.readings import joint_angles
+from pkmcal.readings.components import Components
+from pkmcal.readings.dependences import always
 from pkmcal.readings.distances import ZERO
 from pkmcal.readings.measured import InFit, Measured
 from pkmcal.readings.predicted import At, Predicted
-from pkmcal.readings.reading import Components, Reading, Sets, Solve
-from pkmcal.readings.unknowns import Dependence, Found, Start, always
+from pkmcal.readings.reading import Reading, Sets, Solve
+from pkmcal.readings.unknowns import Dependence, Found, Nature, Start
 
 _COLUMN = re.compile(r"angle:(.+)")
 
@@ -83,7 +85,8 @@ class Angle(Reading):
     def dependences(self, data: InFit) -> Iterator[Dependence]:
         """The zero of the sensor."""
         joints = [str(self.joint)] * len(data.measured)
-        yield always("zero", "angle", (("zero", "rad"),), joints, data.starts)
+        zero = (("zero", "rad"),)
+        yield always("zero", "angle", zero, joints, data.starts, nature=Nature(joint=True))
 
     def starts(self, machine: Any, sets: Sets, found: Found) -> None:
         """The zero with which the nominal machine reads the angles, as a mean direction."""

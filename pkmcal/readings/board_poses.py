@@ -24,6 +24,8 @@ from pkmcal.statistics.distributions import f_tail
 FEWEST = 4  # corners of a picture that tell where a flat board is; of another one two more
 _UNBENDING = 20  # rounds of undoing the distortion
 _UNBENT = 1e-15  # change of a direction at which it is undone
+_MANY = 8  # corners, of fewer than which the search begins once more
+_ASIDE = 0.2  # rad, to either side
 _LOST = 0.05  # of the extent in a picture, by which its corners are off where the search is lost
 _STEPS = 30  # of Levenberg and Marquardt
 _DAMPED = 1e-12  # at least, so that corners in a point or a line have a step
@@ -82,12 +84,13 @@ def board_poses(
         for guess in _guessed(corner, direction, picture, _projection)
     ]
     pose, rms = (np.stack(each, axis=1) for each in zip(*found, strict=True))
-    lost = np.flatnonzero(~(rms.min(axis=1) <= _LOST * _extents(pixel, picture)))
+    few = np.bincount(picture) < _MANY  # of which three may be in a line: see `_affinity`
+    lost = np.flatnonzero(few | ~(rms.min(axis=1) <= _LOST * _extents(pixel, picture)))
     if len(lost):
         rows, among = _of_pictures(lost, picture, len(pose))
         some = corner[rows], pixel[rows], lens[rows], among
         for i, guess in enumerate(_guessed(some[0], direction[rows], among, _affinity)):
-            again, off = _refined(guess, *some)
+            again, off = _aside(_refined(guess, *some)[0], 1.0 - 2.0 * i, *some)
             better = off < rms[lost, i]
             pose[lost[better], i], rms[lost[better], i] = again[better], off[better]
     turn = orientation.between(pose[:, 1, 3:], pose[:, 0, 3:])
@@ -330,6 +333,30 @@ def _refined(
         moving = moving[~(small | (damping[moving] > 1e12))]
     count = np.bincount(picture, minlength=len(pose))
     return pose, np.sqrt(cost / count)
+
+
+def _aside(
+    pose: FloatArray,
+    side: float,
+    corner: FloatArray,
+    pixel: FloatArray,
+    lens: FloatArray,
+    picture: IntArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Return `_refined` from places (P, 6) turned a little, to one side, by what is told least.
+
+    Between two places of a flat board there is one at which squares are level, and a search that
+    begins near it ends there.
+    """
+    _, normal, _ = _equations(pose, corner, pixel, lens, picture)
+    size = np.sqrt(np.einsum("pii->pi", normal))
+    known = np.isfinite(size).all(axis=1) & (size > 0.0).all(axis=1)
+    scaled = normal[known] / (size[known, :, None] * size[known, None, :])
+    least = np.linalg.eigh(scaled)[1][:, :, 0] / size[known]
+    turned = pose.copy()
+    turn = np.linalg.norm(least[:, :3], axis=1, keepdims=True)
+    turned[known] = _moved(pose[known], side * _ASIDE * least / turn)
+    return _refined(turned, corner, pixel, lens, picture)
 
 
 def _equations(

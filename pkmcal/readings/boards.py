@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal.arguments import flag, number, shown
-from pkmcal.arrays import FloatArray, Int64Array
+from pkmcal.arrays import FloatArray, Int64Array, IntArray
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.csv_table import Table
 from pkmcal.readings import rows
@@ -205,6 +205,20 @@ class Board:
             return Board.charuco(columns, rows_, *lengths, dictionary, legacy)
         return Board.apriltags(columns, rows_, *lengths, dictionary)
 
+    @property
+    def outline(self) -> FloatArray:
+        """Places (n, 3), mm, that have to be in a picture in which detectors find all corners.
+
+        Corners and middles of the edges of what is printed, of tags with white around them; of
+        points that were measured otherwise the points.
+        """
+        if self.kind == "points":
+            return self.places
+        around = self.sizes[1] if self.kind == "apriltags" else self.sizes[0]
+        least, most = self.places.min(axis=0)[:2] - around, self.places.max(axis=0)[:2] + around
+        shares = np.array([[0, 0], [1, 0], [2, 0], [2, 1], [2, 2], [1, 2], [0, 2], [0, 1]]) / 2.0
+        return np.column_stack([least + shares * (most - least), np.zeros(len(shares))])
+
     def at(self, ids: ArrayLike) -> FloatArray:
         """Places (N, 3), mm, of corners by their numbers (N,).
 
@@ -213,6 +227,26 @@ class Board:
         ValueError
             A number that the board does not have.
         """
+        places: FloatArray = self.places[self._entries(ids)]
+        return places
+
+    def outward_at(self, ids: ArrayLike) -> FloatArray | None:
+        """Where corners (N,) are from the middle of their tag (N, 3), length 1; None without tags.
+
+        Raises
+        ------
+        ValueError
+            A number that the board does not have.
+        """
+        if self.kind != "apriltags":
+            return None
+        tags = self.places.reshape(-1, 4, 3)
+        away = (tags - tags.mean(axis=1, keepdims=True)).reshape(-1, 3)
+        ways: FloatArray = away / np.linalg.norm(away, axis=1, keepdims=True)
+        return ways[self._entries(ids)]
+
+    def _entries(self, ids: ArrayLike) -> IntArray:
+        """Return where corners (N,) stand among `ids`."""
         asked = np.atleast_1d(ids)
         order = np.argsort(self.ids)
         place = np.minimum(np.searchsorted(self.ids, asked, sorter=order), len(order) - 1)
@@ -223,8 +257,7 @@ class Board:
                 f"corner: the board has {len(self.ids)} corners, {self.ids.min()} to"
                 f" {self.ids.max()}; found {asked[wrong][0]}"
             )
-        places: FloatArray = self.places[found]
-        return places
+        return found
 
 
 def _board(

@@ -23,12 +23,14 @@ from pkmcal.arguments import word
 from pkmcal.arrays import FloatArray, IntArray, as_rows, first_of_equal
 from pkmcal.core import instruments, screws
 from pkmcal.core.poses import NOWHERE
+from pkmcal.display import printable
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.csv_table import Table
 from pkmcal.readings import rows, twists
 from pkmcal.readings.alignment import Laid, Sighting, frame_of_poses
 from pkmcal.readings.board_poses import mm_per_pixel, pictures_told
 from pkmcal.readings.boards import Board
+from pkmcal.readings.dependences import always
 from pkmcal.readings.lens import (
     FOUND,
     LENS,
@@ -43,9 +45,9 @@ from pkmcal.readings.measured import InFit, Measured
 from pkmcal.readings.pictures import Picture, of_pictures_that_are_fitted, pictures
 from pkmcal.readings.predicted import At, Lots, Predicted, Shared
 from pkmcal.readings.reading import HeldNumbers, Reading, Sets, Solve
-from pkmcal.readings.seen_places import tool_places
+from pkmcal.readings.seen_places import places_of_markers, tool_places
 from pkmcal.readings.sight import visible
-from pkmcal.readings.unknowns import PLACE, Dependence, Numbers, Start, always
+from pkmcal.readings.unknowns import PLACE, Dependence, Nature, Numbers, Start
 from pkmcal.readings.unknowns import Found as Starts
 
 Mount = Literal["base", "platform"]
@@ -55,6 +57,13 @@ _NO_SIZE = np.zeros(1)
 def _dotted(*words: str) -> str:
     """Words that are not empty, with dots between."""
     return ".".join(filter(None, words))
+
+
+def _names(m: Measured, rows_: IntArray) -> list[str]:
+    """What messages call the pictures of rows (P,)."""
+    if m.pose_name is not None:
+        return [printable(m.pose_name[i]) for i in rows_.tolist()]
+    return [f"that of row {i}" if m.group is None else str(m.group[i]) for i in rows_.tolist()]
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +77,9 @@ class Camera(Reading):
     ----------
     corner : (3,) or (N, 3) array
         The corner of each row in axes of its board, mm; see `Board.at`.
+    outward : (3,) or (N, 3) array, optional
+        Of corners of tags, in axes of the board, the way from the middle of their tag; see
+        `Board.outward_at`. Detectors put such corners out or in alike, which is then tested.
     on : {"base", "platform"}
         What the camera is fixed to; the board is on the other. On the base the unknown ``frame`` is
         the base in axes of the camera (z forward, x right, y down), ``tool`` the board on the
@@ -112,6 +124,7 @@ class Camera(Reading):
     """
 
     corner: ArrayLike | None = None
+    outward: ArrayLike | None = None
     on: Mount = "base"
     fx: float = 0.0
     fy: float = 0.0
@@ -139,24 +152,31 @@ class Camera(Reading):
     placed: ClassVar[bool] = False
     tells_actuators: ClassVar[bool] = True
     scaled_by: ClassVar[str] = "board"
+    unknown_with_target = ("tool",)
+    told_apart_by = "name the camera, or the board that stands (camera_name, board_name)"
     frame_order: ClassVar[int] = 5
     held = (
         HeldNumbers(
             "another focal length or middle of the lens",
-            "--lens focal (lens='focal'), or calibrate the camera as it is",
+            "--lens focal (lens='focal'), or calibrate the camera as it is, pictures this way up",
             "lens", (0, 1, 2, 3),
         ),
         HeldNumbers(
             "another distortion of the lens",
-            "--lens all (lens='all'), or calibrate the camera as it is",
+            "--lens all (lens='all'), or calibrate the camera as it is, pictures this way up",
             "lens", (4, 5, 6, 7),
         ),
         HeldNumbers(
             "a board of another size", "measure it, or --find-size (find_size=True)", "size", (0,)
         ),
+        HeldNumbers(
+            "a detector that puts corners of tags further out, or in, than they are",
+            "another way of refining corners, or a board of squares (charuco, chessboard)",
+            "outward", (0,),
+        ),
     )  # fmt: skip
     by_rows = ("lens", "size")
-    own_points = ("corner",)
+    own_points = ("corner", "outward")
     truth = ("stands", "carried")
     stated = ("board",)
 
@@ -245,8 +265,12 @@ class Camera(Reading):
         """
         pictures = np.atleast_2d(rows.numbers("q", q))
         count = len(board.ids)
-        corner = np.tile(board.places, (len(pictures), 1))
-        return np.repeat(pictures, count, axis=0), self.with_fields({"corner": corner})
+        every = np.tile(board.ids, len(pictures))
+        return np.repeat(pictures, count, axis=0), self._before(board, every)
+
+    def _before(self, board: Board, ids: IntArray) -> Camera:
+        """The camera before corners (N,) of a board."""
+        return self.with_fields({"corner": board.at(ids), "outward": board.outward_at(ids)})
 
     def of_poses(self, q: FloatArray) -> tuple[FloatArray, Camera]:
         """A picture at each: rows of all corners of its board, where they are not stated."""
@@ -254,6 +278,13 @@ class Camera(Reading):
             return q, self
         rows_, seeing = self.seeing(q, self.board)
         return rows_, seeing.with_fields({"board": None})
+
+    def required(self, q: FloatArray) -> tuple[FloatArray, Camera]:
+        """What is printed has to be in the picture whole, or detectors miss its outer corners."""
+        if self.board is None or self.corner is not None:
+            return q, self
+        seen = self.board.outline
+        return self.seeing(q, Board.points(range(len(seen)), seen))
 
     # the model ------------------------------------------------------------------------------------
 
@@ -322,6 +353,12 @@ class Camera(Reading):
             size,
         )
         seen[~(depth > 0)] = np.nan
+        own = {"lens": by_lens, "size": by_size[:, :, None]}
+        if self.outward is not None:
+            out = np.broadcast_to(np.asarray(self.outward, dtype=np.float64), (count, 3))
+            moved = by_motion[:, :, 3:] @ (board[lots.of, :3, :3] @ out[:, :, None])
+            length = np.linalg.norm(moved, axis=1, keepdims=True)
+            own["outward"] = moved / np.where(length > 0.0, length, 1.0)  # px
         of_pose = twists.adjoint(base[None]) @ twists.at_base(pose)
         of_tool = twists.adjoint(to_mounting) @ twists.twists_of_numbers(within)
         of_frame = None
@@ -337,7 +374,7 @@ class Camera(Reading):
             by_motion,
             of_pose,
             {"tool": of_tool},
-            {"lens": by_lens, "size": by_size[:, :, None]},
+            own,
             of_frame,
         )
 
@@ -345,13 +382,16 @@ class Camera(Reading):
         """Return what is on the platform, the lens, and the size of the board."""
         m = data.measured
         count, every = len(m), np.zeros(len(m), dtype=np.intp)
-        yield always("tool", "tool", PLACE, [self._carried_thing] * count, data.starts)
+        things = [self._carried_thing] * count
+        nature = Nature("platform", pose=True)
+        yield always("tool", "tool", PLACE, things, data.starts, nature=nature)
         yield Dependence("corner", "corner", self._corners(count), {}, every)
         lens = np.tile(self.lens_numbers(), (count, 1))
         known = None if self.lens != "none" else self._lens_known()
         slots = FOUND[self.lens] if known is None else np.flatnonzero(np.diagonal(known)).tolist()
         found = {self.camera_name: self._lens_found(m, slots, known)} if slots else {}
-        yield Dependence("lens", "lens" if known is None else "lens as stated", lens, found, every)
+        role = "lens" if known is None else "lens as stated"
+        yield Dependence("lens", role, lens, found, every, Nature(alone=True))
         if self.find_size:
             extent = float(np.abs(self._corners(count)).max(initial=1.0))
             number = Numbers(
@@ -405,14 +445,22 @@ class Camera(Reading):
         """Pose (N, 6) of the tool in the frame, by the whole picture of each of its first rows.
 
         Of both places at which a small flat board looks alike that of which several pictures and
-        the machine's poses (N, 6) agree; NaN in all other rows.
+        the machine's poses (N, 6) agree; NaN in all other rows. Of markers that are one point each
+        all pictures together tell where the camera is, as if they were at the platform's origin.
         """
         used, number = self._pictures_told(m)
+        if not len(used):
+            return places_of_markers(
+                self._corners(len(m)), m.values, self.lens_numbers(), self.on == "platform", pose
+            )
         seen = self._corners(len(m))[used], m.values[used], number
         first = np.unique(number, return_index=True)[1]
-        places = tool_places(*seen, self.lens_numbers(), self.on == "platform", pose[used[first]])
+        shown = used[first]
+        places = tool_places(
+            *seen, self.lens_numbers(), self.on == "platform", pose[shown], _names(m, shown)
+        )
         found = np.full((len(m), 6), np.nan)
-        found[used[first]] = places
+        found[shown] = places
         return found
 
     def doubts(self, m: Measured) -> Iterator[str]:
@@ -542,5 +590,8 @@ class Camera(Reading):
                 "column 'corner': state the board and the lens of the camera, as --camera FILE"
                 " --board BOARD (kind=pkmcal.readings.Camera(board=Board.parse(...), ...))"
             )
-        places = self.board.at(table.integers("corner"))
-        return self.with_fields({"corner": places, "board": None})
+        try:
+            return self._before(self.board, table.integers("corner")).with_fields({"board": None})
+        except ArgumentError as error:
+            hint = "state the board that was printed, its columns before its rows"
+            raise table.header_error(f"column {error}; {hint}") from None

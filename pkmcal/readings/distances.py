@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -10,16 +10,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal.arrays import FloatArray, TextArray
-from pkmcal.core import instruments
+from pkmcal.core import instruments, screws
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.csv_table import Table
 from pkmcal.files.csv_writer import WrittenColumn, numbered
 from pkmcal.readings import rows
+from pkmcal.readings.components import Components
+from pkmcal.readings.dependences import always, point
 from pkmcal.readings.measured import InFit, Measured
 from pkmcal.readings.points import ORIGIN
 from pkmcal.readings.predicted import At, Predicted
-from pkmcal.readings.reading import Components, Reading, Sets, Solve
-from pkmcal.readings.unknowns import Dependence, Found, Start, always, point
+from pkmcal.readings.reading import Reading, Sets, Solve
+from pkmcal.readings.unknowns import Dependence, Found, Start
 
 DISTANCE: Components = (("distance", "mm"),)
 ZERO = np.zeros(1)
@@ -43,6 +45,8 @@ class Distance(Reading):
     name = "distance"
     components = DISTANCE
     point = "base"
+    unknown_with_target = ("anchor",)
+    unknown_with_attachment = ("attachment",)
     own_points = ("attachment",)
 
     def predict(
@@ -63,6 +67,12 @@ class Distance(Reading):
         """Return both ends of the distance."""
         yield point(data.measured, "target", "attachment", data.unknown_attachment)
         yield point(data.measured, "anchor", "anchor", data.unknown_target)
+
+    def reach(self, pose: FloatArray, numbers: Mapping[str, FloatArray]) -> FloatArray:
+        """From the point of the base to that of the platform."""
+        turned = screws.frames(pose)[:, :3, :3] @ numbers["target"][:, :, None]
+        away: FloatArray = pose[:, :3] + turned[:, :, 0] - numbers["anchor"]
+        return away
 
     def arguments(self, m: Measured) -> dict[str, FloatArray]:
         """Return both ends as stated."""

@@ -68,7 +68,7 @@ def lens_doubts(
         ]
         left, what, how = min(tried, key=lambda each: each[0])
         fits = left * _FITS < off and left < _AS_WELL * least
-        if left * _FALLS < max(off, _CLEAR) or fits:
+        if left * _FALLS < off or fits:
             yield (
                 f"the lens is that of {what} pictures: its middle is at"
                 f" {lens[2]:.0f}, {lens[3]:.0f} and pixels reach {most[0]:.0f}, {most[1]:.0f};"

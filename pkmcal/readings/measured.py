@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Protocol
 
-from pkmcal.arrays import FloatArray, Int64Array
+from pkmcal.arrays import FloatArray, Int64Array, TextArray
 from pkmcal.kinematics.drive_state import DriveState
 
 
@@ -46,6 +46,10 @@ class Measured(Protocol):
     @property
     def group(self) -> Int64Array | None:
         """Group of rows that repeat one pose, or one picture."""
+
+    @property
+    def pose_name(self) -> TextArray | None:
+        """The name of the pose of each row, or of its picture."""
 
     @property
     def drive_state(self) -> DriveState:

@@ -48,7 +48,8 @@ def shortest(angles: FloatArray) -> FloatArray:
 
 def by_turning(vectors: FloatArray) -> FloatArray:
     """Return how rotation vectors (N, 3) shrink as the prediction turns, (N, 3, 3): near 0, one."""
-    twists = np.hstack([-vectors, np.zeros_like(vectors)])
+    twists = np.zeros((len(vectors), 6))
+    twists[:, :3] = -vectors
     rates: FloatArray = screws.exp_jacobian(twists, inverse=True).reshape(-1, 6, 6)[:, :3, :3]
     return rates
 

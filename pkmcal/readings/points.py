@@ -13,10 +13,11 @@ from pkmcal.core import instruments
 from pkmcal.files.column_names import is_turned
 from pkmcal.files.csv_table import Table
 from pkmcal.readings.alignment import Laid, Sighting, frame_of_points, of_heights
+from pkmcal.readings.dependences import point
 from pkmcal.readings.measured import InFit, Measured
 from pkmcal.readings.predicted import At, Predicted
 from pkmcal.readings.reading import Reading
-from pkmcal.readings.unknowns import POINT, Dependence, point
+from pkmcal.readings.unknowns import POINT, Dependence
 
 ORIGIN = np.zeros(3)
 PLACE_TITLE = "x, y, z"

@@ -12,7 +12,7 @@ import numpy as np
 from pkmcal.arguments import kind
 from pkmcal.arrays import FloatArray, IntArray, chained
 from pkmcal.core.poses import NOWHERE
-from pkmcal.exceptions import ArgumentError, ArgumentTypeError, Error
+from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.readings.measured import Measured
 
 MOTION = 6  # numbers of the motion of a lot of rows: ω, then v
@@ -90,42 +90,30 @@ class Predicted:
 
 def require_shape(what: str, found: object, shape: tuple[int, ...]) -> None:
     """Refuse what a class of the user's own returned if it is no array of this shape."""
-    if not isinstance(found, np.ndarray) or found.shape != shape:
-        seen = found.shape if isinstance(found, np.ndarray) else kind(found)
+    if type(found) is not np.ndarray or found.shape != shape:
+        seen = found.shape if type(found) is np.ndarray else kind(found)
         raise ArgumentError(f"{what} must be an array of shape {shape}; found {seen}")
-    if found.dtype.kind == "f" and found.dtype.itemsize < 8:
+    if found.dtype.kind not in "iuf" or (found.dtype.kind == "f" and found.dtype.itemsize < 8):
         raise ArgumentError(f"{what} must be doubles; found {found.dtype}")
 
 
-def of_the_package(given: object) -> bool:
-    """Return whether the class of an object is one of the package, and none of the user's."""
-    return type(given).__module__.partition(".")[0] == __name__.partition(".")[0]
-
-
-def predicted_by(reading: Any, at: At, numbers: Mapping[str, Any]) -> Predicted:
-    """Return what a reading predicts; where a class of the user's own fails, it is named.
-
-    Raises
-    ------
-    TypeError
-        An argument that its `predict` does not take or misses, a derivative that it forgot, …
-    """
-    try:
-        found: Predicted = reading.predict(at, **numbers)
-    except Exception as error:
-        if isinstance(error, Error) or of_the_package(reading):
-            raise
-        given = ", ".join(["at", *numbers])
+def require_by(what: str, found: object, shape: tuple[int, ...]) -> None:
+    """Refuse derivatives by arguments that are none of this shape, with numbers behind it."""
+    if not isinstance(found, Mapping):
         raise ArgumentTypeError(
-            f"kind: predict of the class {type(reading).__name__} failed with"
-            f" {type(error).__name__}: {error}; it is given {given} (what its methods arguments and"
-            " dependences name) and has to return Predicted(values, by_twist, by)"
-        ) from error
-    return found
+            f"{what} must have the derivative by each argument by its name, as in"
+            f' {{"target": …}}; found {kind(found)}'
+        )
+    for name, each in found.items():
+        width = np.shape(each)[-1] if np.ndim(each) > len(shape) else 1
+        require_shape(f"{what}[{name!r}]", each, (*shape, width))
 
 
-def require_predicted(reading: Any, rows: int, found: object) -> None:
-    """Refuse what `predict` of a reading returned without values (N, k), derivatives (N, k, 6)."""
+def require_predicted(reading: Any, rows: int, found: object, framed: bool = False) -> None:
+    """Refuse what `predict` of a reading returned without values (N, k), derivatives (N, k, 6).
+
+    `framed`: it was asked in a frame, by which it then has a derivative.
+    """
     what, components = f"kind: predict of {reading.name!r}", len(reading.components)
     if not isinstance(found, Predicted):
         raise ArgumentTypeError(f"{what} must return Predicted(…); found {kind(found)}")
@@ -134,11 +122,12 @@ def require_predicted(reading: Any, rows: int, found: object) -> None:
     for side in ("by_frame", "by_other"):
         if getattr(found, side) is not None:
             require_shape(f"{what}: {side}", getattr(found, side), (rows, components, 6))
-    if not isinstance(found.by, Mapping):
-        raise ArgumentTypeError(
-            f"{what}: by must have the derivative by each argument by its name, as in"
-            f' {{"target": …}}; found {kind(found.by)}'
+    if framed and found.by_frame is None:
+        raise ArgumentError(
+            f"{what}: by_frame is missing, the derivative by the pose of the base in the frame of"
+            f" the instrument: the class {type(reading).__name__} states framed = True"
         )
+    require_by(f"{what}: by", found.by, (rows, components))
 
 
 def require_arguments(reading: Any, at: At, given: Mapping[str, Any], method: str) -> None:
@@ -160,7 +149,7 @@ def require_arguments(reading: Any, at: At, given: Mapping[str, Any], method: st
     listed = inspect.signature(reading.predict).parameters
     for each in given.keys() - listed.keys():
         other = {**given, each: np.asarray(given[each]) + 1.0}
-        one, two = (predicted_by(reading, at, numbers) for numbers in (given, other))
+        one, two = (reading.predict(at, **numbers) for numbers in (given, other))
         if isinstance(one, Predicted) and np.array_equal(one.values, two.values, equal_nan=True):
             raise ArgumentError(f"{what}: {each!r} is no argument of predict, which ignores it")
 

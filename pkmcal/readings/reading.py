@@ -11,32 +11,31 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
-from functools import cache
 from os import PathLike
-from typing import Any, ClassVar, Literal, NamedTuple, Protocol, TypeVar
+from typing import Any, ClassVar, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal.arrays import FloatArray, IntArray, lots, mm_per_unit
-from pkmcal.exceptions import ArgumentError
+from pkmcal.exceptions import ArgumentError, of_the_package
 from pkmcal.files.csv_table import Table
 from pkmcal.files.csv_writer import WrittenColumn
 from pkmcal.readings import orientation, rows
 from pkmcal.readings.alignment import Laid, Sighting
+from pkmcal.readings.components import Components, Family, families_by_unit, units_of
 from pkmcal.readings.measured import InFit, Measured
+from pkmcal.readings.own_methods import watch
 from pkmcal.readings.predicted import (
     At,
     Lots,
     Predicted,
     Shared,
-    predicted_by,
     require_arguments,
     require_predicted,
 )
-from pkmcal.readings.unknowns import Dependence, Found
+from pkmcal.readings.unknowns import Body, Dependence, Found
 
-Components = tuple[tuple[str, str], ...]
 Sets = Sequence[tuple[InFit, FloatArray]]  # rows of a calibration, and their nominal poses
 Own = TypeVar("Own", bound="Reading")
 
@@ -50,47 +49,6 @@ class Solve(Protocol):
 
     def __call__(self, actuators: FloatArray, argument: str) -> Any:
         """Solve rows of actuators; what cannot be solved is refused as this argument's fault."""
-
-
-class Family(NamedTuple):
-    """Components of a reading that have one unit.
-
-    Attributes
-    ----------
-    unit : str
-        Their unit.
-    columns : tuple of int
-        Which they are.
-    """
-
-    unit: str
-    columns: tuple[int, ...] = ()
-
-    @property
-    def noun(self) -> str:
-        """Noun for these readings."""
-        return {"mm": "lengths", "rad": "angles"}.get(self.unit, f"readings in {self.unit}")
-
-
-@cache
-def names_of(components: Components) -> tuple[str, ...]:
-    """Names of components."""
-    return tuple(name for name, _ in components)
-
-
-@cache
-def units_of(components: Components) -> tuple[str, ...]:
-    """Units of components."""
-    return tuple(unit for _, unit in components)
-
-
-@cache
-def families_by_unit(units: tuple[str, ...]) -> tuple[Family, ...]:
-    """Group components by their units into families."""
-    return tuple(
-        Family(unit, tuple(k for k, each in enumerate(units) if each == unit))
-        for unit in dict.fromkeys(units)
-    )
 
 
 class HeldNumbers(NamedTuple):
@@ -112,6 +70,25 @@ class HeldNumbers(NamedTuple):
     cure: str
     argument: str
     slots: tuple[int, ...]
+
+
+class StatedBeside(NamedTuple):
+    """What instruments state beside their rows, as readings of another kind.
+
+    Attributes
+    ----------
+    instrument : Reading
+        That kind.
+    values, sigma : sequence of float
+        A value of each, and its standard deviation.
+    places : sequence of (int, int)
+        A set and a row of it for each: where the machine then stands; nothing follows from it.
+    """
+
+    instrument: Reading
+    values: Sequence[float]
+    sigma: Sequence[float]
+    places: Sequence[tuple[int, int]]
 
 
 class Reading:
@@ -142,6 +119,13 @@ class Reading:
         Whether its first components are x, y and z of the platform, or of a point of it.
     point : str
         Which body `Measurements.target` is a point of: the "platform", the "base", or "", neither.
+    unknown_with_target, unknown_with_attachment : tuple of str
+        The roles in `dependences` of what is unknown where `identify` is told that targets, or
+        attachments, are: each set may then have its own, and their uncertainty may be stated.
+    by_contact : bool
+        Whether the machine was driven until it touched: a value is then no length that was read.
+    told_apart_by : str
+        What to state of instruments that stand apart, so that each has a frame of its own.
     nouns : (str, str) or None
         What one and several are called, where not as the kind and with an s.
     shrinks : bool
@@ -186,7 +170,11 @@ class Reading:
     scaled_by: ClassVar[str] = ""
     frame_order: ClassVar[int] = 9
     is_place: ClassVar[bool] = False
-    point: ClassVar[Literal["platform", "base", ""]] = ""
+    point: ClassVar[Body] = ""
+    unknown_with_target: ClassVar[tuple[str, ...]] = ("target",)
+    unknown_with_attachment: ClassVar[tuple[str, ...]] = ()
+    by_contact: ClassVar[bool] = False
+    told_apart_by: ClassVar[str] = ""
     nouns: ClassVar[tuple[str, str] | None] = None
     shrinks: ClassVar[bool] = False
     more: ClassVar[str] = "measure more poses"
@@ -202,6 +190,11 @@ class Reading:
     own_points: ClassVar[tuple[str, ...]] = ()
     truth: ClassVar[tuple[str, ...]] = ()
     stated: ClassVar[tuple[str, ...]] = ()
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        if not of_the_package(cls):
+            watch(cls, Reading, "kind")
 
     # the model ------------------------------------------------------------------------------------
 
@@ -258,6 +251,21 @@ class Reading:
 
     def starts(self, machine: Any, sets: Sets, found: Found) -> None:
         """Add to `found` where the search starts for unknowns that have no present value."""
+
+    def axis(self, data: InFit) -> IntArray | None:
+        """The axis, 0, 1 or 2, from which the numbers of each row's thing count, for `At.axis`."""
+        return None
+
+    def reach(self, pose: FloatArray, numbers: Mapping[str, FloatArray]) -> FloatArray | None:
+        """Vectors (N, 3), mm, in the base's axes, whose lengths are read; by numbers of `predict`.
+
+        None: lengths are read of the place of the platform, or of a point of it, from a fixed one.
+        """
+        return None
+
+    def stated_beside(self, sets: Sequence[Measured]) -> StatedBeside | None:
+        """What the instruments of all sets of this kind state beside their rows; None: nothing."""
+        return None
 
     def frame(self, seen: Sighting) -> Laid:
         """Place the frame where its search begins: the base in it, and shifts of unknown targets.
@@ -321,11 +329,15 @@ class Reading:
         """
         return q, self
 
+    def required(self: Own, q: FloatArray) -> tuple[FloatArray, Own]:
+        """As `of_poses`, of what has to be read where a pose of a plan is to be measured."""
+        return self.of_poses(q)
+
     def simulated(self, m: Measured, solve: Solve) -> FloatArray:
         """Compute what the instrument would read without noise, (N, k)."""
         at, given = At(solve(m.actuators, "q").pose, axis=np.full(len(m), 2)), self.arguments(m)
         require_arguments(self, at, given, "arguments")
-        found = predicted_by(self, at, given)
+        found = self.predict(at, **given)
         require_predicted(self, len(m), found)
         return found.values
 
@@ -416,6 +428,10 @@ class Reading:
             if (given := getattr(self, name)) is None:
                 raise ArgumentError(f"{name}: {self.noun()} need one for each row, by its name")
             found[name] = rows.names(name, given, len(actuators))
+        for name in self.per_row:
+            if (given := getattr(self, name)) is None:
+                continue
+            found[name] = rows.each(name, given, len(actuators))
         for name in self.own_points:
             if (given := getattr(self, name)) is None:
                 continue
@@ -519,6 +535,12 @@ class Reading:
 
     def columns(self, units: Sequence[str]) -> Iterator[WrittenColumn]:
         """Columns that hold the fields with an entry for every row."""
+        for name in self.per_row:
+            if getattr(self, name) is not None:
+                raise ArgumentError(
+                    f"kind: {name} of {self.name!r} has an entry for every row and no column: its"
+                    " class has to state in methods columns, names and read how it is written"
+                )
         for name in self.labels:
             yield WrittenColumn(name, "", getattr(self, name))
 

@@ -66,6 +66,19 @@ def names(argument: str, given: Sequence[str] | TextArray, rows: int) -> TextArr
     return np.array(found)
 
 
+def each(argument: str, given: ArrayLike, rows: int) -> np.ndarray:
+    """A copy with an entry of any class, or an array, for each row."""
+    try:
+        found = np.array(given)
+    except ValueError:  # arrays of several shapes
+        found = np.empty(0)
+    if found.shape[:1] != (rows,):
+        raise ArgumentError(
+            f"{argument} must have an entry for each of {rows} rows; found {shown(given)}"
+        )
+    return found
+
+
 def of_names(table: Table, wanted: Mapping[str, str]) -> IntArray:
     """Rows of a table whose columns, as far as it has them, have these names.
 

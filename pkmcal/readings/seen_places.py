@@ -9,13 +9,15 @@ counts (M. A. Fischler and R. C. Bolles, Random sample consensus, Communications
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.core.poses import compose
-from pkmcal.exceptions import ArgumentError
+from pkmcal.exceptions import ArgumentError, FitError
 from pkmcal.readings import orientation, twists
-from pkmcal.readings.board_poses import board_poses, facing, summed
+from pkmcal.readings.board_poses import board_poses, facing, pictures_told, summed
 from pkmcal.readings.hand_eye import of_frame_and_tool
 
 _FEWEST = 4  # pictures, more of which tell that they are mirrored
@@ -26,6 +28,9 @@ _DRAWN = 5  # pictures of a draw
 _DRAWS = 60
 _ROUNDS = 10  # of choosing and laying in turn
 _GROSS = 0.2  # rad, or share of the distance, beyond which a picture is off and no more
+_ODD, _TIMES = 0.05, 10.0  # the same, and times the median, by which a picture is of another row
+_LISTED = 6  # pictures
+_ASTRAY = 0.3  # share of the way between pictures, by which most are off their places at most
 
 
 def tool_places(
@@ -35,6 +40,7 @@ def tool_places(
     lens: FloatArray,
     rides: bool,
     pose: FloatArray,
+    names: Sequence[str],
 ) -> FloatArray:
     """Pose (P, 6) of the tool in the frame of what stands, by each picture.
 
@@ -50,17 +56,21 @@ def tool_places(
         Whether the camera is the tool, not the board.
     pose : ndarray (P, 6)
         Of the nominal machine.
+    names : sequence of str, P
+        Of the pictures.
 
     Raises
     ------
     ValueError
-        The pictures are mirrored, or do not belong to these poses.
+        The pictures are mirrored, exchanged, or do not belong to these poses.
     """
     if not len(pose):
         return np.empty((0, 6))
     places, behind = _agreed(corner, pixel, picture, lens, rides, pose)
+    odd = _require_own_poses(places, pose, names)
     off = disagreement(places, pose) if len(pose) > _FEWEST else 0.0
-    if off <= _OFF:
+    astray = off > _ODD / 2.0 and _astray(places, pose)
+    if off <= _OFF and not astray:
         return places
     mirrored = lens * np.where(np.arange(9) == 7, -1.0, 1.0)  # p2
     across = pixel * [-1, 1] + [2 * lens[2], 0]
@@ -75,7 +85,7 @@ def tool_places(
                 " pictures without mirroring, or state u as the width less 1 less u"
             )
     many = np.bincount(picture) >= _MANY
-    if many.sum() <= _FEWEST or disagreement(places[many], pose[many]) <= _OFF:
+    if many.sum() <= _FEWEST or not (astray or disagreement(places[many], pose[many]) > _OFF):
         return places
     trials = {"with the camera on the other of base and platform": (not rides, pose)}
     for how, rows in (("next", 1), ("previous", -1)):
@@ -86,14 +96,49 @@ def tool_places(
     }
     how = min(found, key=lambda each: found[each])
     fits = found[how] * _FALLS < off
-    if fits or off > _GROSS:
+    if fits or off > _GROSS or astray:
         better = f", and by {np.degrees(found[how]):.2g} deg {how}" if fits else ""
-        raise ArgumentError(
-            f"measurements: where pictures show the board differs by {np.degrees(off):.2g} deg from"
+        if len(odd):
+            which = ", ".join(names[i] for i in odd[:_LISTED]) + (
+                " …" if len(odd) > _LISTED else ""
+            )
+            better = f", for {len(odd)} of {len(pose)} do not agree with the others: {which}"
+        raise FitError(
+            f"where pictures show the board differs by {np.degrees(off):.2g} deg from"
             f" how the machine moves{better}: pictures and"
             " actuators have to belong together, row by row; check what the camera is on, and signs"
             " and units of the actuators"
         )
+    return places
+
+
+def places_of_markers(
+    corner: FloatArray, pixel: FloatArray, lens: FloatArray, rides: bool, pose: FloatArray
+) -> FloatArray:
+    """Pose (N, 6) of a board of too few corners in the frame of a camera that stands.
+
+    Corners (N, 3) that the machine moves about are seen, by all pictures, as those of one board as
+    large as its workspace, where they are taken to be on the platform in its own axes. NaN where
+    nothing is seen.
+
+    Raises
+    ------
+    ValueError
+        The camera rides, or places are too few or nearly in a line.
+    """
+    seen = np.flatnonzero(np.isfinite(pixel).all(axis=1) & np.isfinite(pose).all(axis=1))
+    about = compose(pose[seen], np.column_stack([corner[seen], np.zeros((len(seen), 3))]))[:, :3]
+    together = np.zeros(len(seen), dtype=np.intp)
+    told = pictures_told(about, pixel[seen], together)[0] if len(seen) and not rides else seen[:0]
+    if not len(told):
+        raise ArgumentError(
+            "measurements: no picture shows four corners of a board that are not in a line, and"
+            " single markers tell where a camera is only if it stands and sees them at six places"
+            " or more: state the corners of a marker as a board, apriltags:1x1,TAG,GAP"
+        )
+    boards = board_poses(about, pixel[seen], lens, together)
+    places = np.full((len(pose), 6), np.nan)
+    places[seen] = compose(np.tile(boards.pose[:, 0], (len(seen), 1)), pose[seen])
     return places
 
 
@@ -169,10 +214,67 @@ def in_agreement(seen: FloatArray, pose: FloatArray) -> FloatArray:
 def disagreement(seen: FloatArray, pose: FloatArray) -> float:
     """Return the median picture's distance from one frame and tool, by places (P, 6) of each.
 
-    An angle, and a share of the distance added to it.
+    An angle, and a share of the distance added to it. Of poses that the machine reaches.
     """
     every = np.arange(len(seen))
-    return float(np.median(_misfits(seen[:, None], pose, every, np.zeros_like(every))))
+    off = _misfits(seen[:, None], pose, every, np.zeros_like(every))
+    return float(np.nanmedian(off)) if np.isfinite(off).any() else np.inf
+
+
+def _astray(seen: FloatArray, pose: FloatArray) -> bool:
+    """Whether most pictures are off by much of the way between them, as of a machine mirrored.
+
+    Of one that does not turn, and of a camera far away, `disagreement` says little.
+    """
+    frame, tool = of_frame_and_tool(seen, pose)
+    place, laid = seen[:, :3], compose(compose(frame, pose), tool)[:, :3]
+    off = np.linalg.norm(place - laid, axis=1)
+    ways = np.linalg.norm(place - np.median(place, axis=0), axis=1)
+    return bool(np.nanmedian(off) > _ASTRAY * np.median(ways))
+
+
+def _require_own_poses(seen: FloatArray, pose: FloatArray, names: Sequence[str]) -> IntArray:
+    """Refuse pictures that are exchanged: each shows the board where another's pose has it.
+
+    Returns those that are off where most agree: none where more than a quarter is.
+    """
+    some = np.isfinite(seen).all(axis=1) & np.isfinite(pose).all(axis=1)
+    if some.sum() <= 2 * _FEWEST:
+        return np.empty(0, dtype=np.intp)
+    laid, off = pose, np.empty(0)
+    for _ in range(_ROUNDS):  # of laying the better half
+        frame, tool = of_frame_and_tool(seen[some], pose[some])
+        laid = compose(compose(frame, pose), tool)
+        off = _apart(seen, laid)
+        before, some = some, off <= np.nanmedian(off)
+        if np.array_equal(before, some):
+            break
+    most = max(_ODD, _TIMES * float(np.nanmedian(off)))
+    odd = np.flatnonzero(off > most)
+    if not 1 <= len(odd) <= len(seen) / 4:
+        return odd[:0]
+    each = np.stack([_apart(seen[odd], laid[np.full(len(odd), other)]) for other in odd], axis=1)
+    of, least = each.argmin(axis=1), each.min(axis=1)
+    if np.array_equal(np.sort(of), np.arange(len(odd))) and (least <= most).all():
+        pairs = zip(odd.tolist(), odd[of].tolist(), strict=True)
+        which = ", ".join(f"{names[i]} shows {names[k]}" for i, k in pairs)
+        raise ArgumentError(
+            "measurements: pictures are exchanged: by where the actuators say that the machine was"
+            f" {which} ({np.degrees(np.median(off[odd])):.2g} deg off as given,"
+            f" {np.degrees(np.median(least)):.2g} deg so): name them as their actuators are"
+        )
+    return odd
+
+
+def _apart(seen: FloatArray, laid: FloatArray) -> FloatArray:
+    """How far places (P, 6) are from others: an angle, and a share of the distance; or NaN."""
+    known = np.isfinite(seen).all(axis=1) & np.isfinite(laid).all(axis=1)
+    turned = orientation.between(seen[known, 3:], laid[known, 3:])
+    moved, distance = seen[:, :3] - laid[:, :3], np.linalg.norm(seen[:, :3], axis=1)
+    off = np.full(len(seen), np.nan)
+    way = np.linalg.norm(moved[known], axis=1) / np.median(distance[known])
+    off[known] = np.linalg.norm(turned, axis=1) + way
+    return off
 
 
 def _taken(seen: FloatArray, chosen: IntArray) -> FloatArray:

@@ -18,6 +18,8 @@ from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.files.csv_table import Table
 from pkmcal.files.csv_writer import WrittenColumn
 from pkmcal.readings import rows
+from pkmcal.readings.components import Components
+from pkmcal.readings.dependences import always, point
 from pkmcal.readings.distances import DISTANCE, ZERO, distances, no_direction
 from pkmcal.readings.known_distances import (
     STATED_DISTANCES,
@@ -29,8 +31,8 @@ from pkmcal.readings.known_distances import (
 from pkmcal.readings.measured import InFit, Measured
 from pkmcal.readings.points import ORIGIN, points, some_components
 from pkmcal.readings.predicted import At, Predicted
-from pkmcal.readings.reading import Components, Reading, Sets
-from pkmcal.readings.unknowns import PLACE, POINT, Dependence, Found, Start, always, point
+from pkmcal.readings.reading import Reading, Sets, StatedBeside
+from pkmcal.readings.unknowns import PLACE, POINT, Dependence, Found, Start
 
 Artefact = Literal["point", "line", "plane", "sphere"]
 
@@ -72,6 +74,7 @@ class Touch(Reading):
 
     name = "touch"
     shrinks = True
+    by_contact = True
     point = "platform"
     nouns = ("touch", "touches")
     starts_by_pose = True
@@ -116,6 +119,34 @@ class Touch(Reading):
     def starts(self, machine: Any, sets: Sets, found: Found) -> None:
         """The artefacts nearest to the points that the nominal machine has reached."""
         _touches([(data.measured, pose) for data, pose in sets], found)
+
+    def axis(self, data: InFit) -> IntArray:
+        """The axis of its own from which each row's line or plane counts."""
+        return np.array([data.starts["touch", name].axis for name in self._names.tolist()])
+
+    def stated_beside(self, sets: Sequence[Measured]) -> StatedBeside | None:
+        """The known distances between what is touched, as readings of their own."""
+        known = [each for m in sets for each in m.instrument.distances]
+        if not known:
+            return None
+        places = []
+        for one, other, _, _ in known:
+            first = {
+                name: (i, int(row))
+                for name in (one, other)
+                for i, m in enumerate(sets)
+                for row in np.flatnonzero(m.instrument.touched == name)[:1]
+            }
+            for name in (one, other):
+                if name not in first:
+                    raise ArgumentError(f"touch_distances: no row touches {name!r}")
+            places.append(first[one])
+        return StatedBeside(
+            TouchDistance(tuple(known)),
+            [mm for _, _, mm, _ in known],
+            [sigma for *_, sigma in known],
+            places,
+        )
 
     def arguments(self, m: Measured) -> dict[str, FloatArray]:
         """Targets and artefacts as stated."""

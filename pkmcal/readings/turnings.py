@@ -23,15 +23,18 @@ from pkmcal.readings.alignment import (
     nearest_rotations,
     of_directions,
 )
+from pkmcal.readings.dependences import always
 from pkmcal.readings.measured import InFit, Measured
 from pkmcal.readings.points import PLACE_TITLE, points
 from pkmcal.readings.predicted import At, Predicted
 from pkmcal.readings.reading import Reading, Sets
-from pkmcal.readings.unknowns import ANGLES, PLACE, Dependence, Found, Start, always
+from pkmcal.readings.unknowns import ANGLES, PLACE, Dependence, Found, Nature, Start
 
 _ORIGIN = np.zeros(3)
 _UP = np.array([0.0, 0.0, 1.0])
 _AXES = ("x", "y", "z")
+_ALIKE = 10.0  # times the least misfit of the nominal machine, which its errors may make of it
+_EXACT = 1e-6  # rad; misfits of which nothing is told
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +44,7 @@ class Pose(Reading):
     name = "pose"
     components = PLACE
     turning = 3
+    unknown_with_target = ("tool",)
     framed = True
     frame_order = 1
     is_place = True
@@ -58,7 +62,9 @@ class Pose(Reading):
     def dependences(self, data: InFit) -> Iterator[Dependence]:
         """The tool, where it is unknown."""
         if data.unknown_target:
-            yield always("tool", "tool", PLACE, [""] * len(data.measured), data.starts)
+            names = [""] * len(data.measured)
+            nature = Nature("platform", pose=True)
+            yield always("tool", "tool", PLACE, names, data.starts, nature=nature)
 
     def starts(self, machine: Any, sets: Sets, found: Found) -> None:
         """An unknown tool at the platform; `estimation.first_frames` aligns it with frames."""
@@ -97,6 +103,7 @@ class Orientation(Reading):
     framed = True
     frame_order: ClassVar[int] = 3
     starts_by_pose = True
+    unknown_with_target = ("mounting",)
     truth = ("mounting",)
 
     def predict(self, at: At, mounting: FloatArray = _ORIGIN, **numbers: FloatArray) -> Predicted:
@@ -163,7 +170,7 @@ class Tilt(Orientation):
 
 
 def _mounted(
-    sets: Sets, found: Found, of: Callable[[FloatArray, FloatArray, bool], FloatArray]
+    sets: Sets, found: Found, of: Callable[[FloatArray, FloatArray, bool], list[FloatArray]]
 ) -> None:
     """Find the mounting of a sensor: by orientations if any were read, else by tilts."""
     if ("mounting", "") in found:
@@ -171,10 +178,10 @@ def _mounted(
     values = np.concatenate([data.measured.values for data, _ in sets])
     pose = np.concatenate([pose for _, pose in sets])
     known = np.isfinite(values).all(axis=1) & np.isfinite(pose).all(axis=1)
-    mounting = np.zeros(3)
+    mountings = [np.zeros(3)]
     if known.any():
-        mounting = of(values[known], pose[known, 3:], sets[0][0].unknown_frame)
-    found["mounting", ""] = Start((0, 1, 2), mounting)
+        mountings = of(values[known], pose[known, 3:], sets[0][0].unknown_frame)
+    found["mounting", ""] = Start((0, 1, 2), mountings[0], others=tuple(mountings[1:]))
 
 
 def _poses(
@@ -198,7 +205,7 @@ def _poses(
     if place.by_frame is not None and turned.by_frame is not None:
         by_frame = np.concatenate([place.by_frame, turned.by_frame], axis=1)
     return Predicted(
-        np.hstack([place.values, turned.values]),
+        np.concatenate([place.values, turned.values], axis=1),
         np.concatenate([place.by_twist, turned.by_twist], axis=1),
         by,
         by_frame=by_frame,
@@ -250,7 +257,7 @@ def _frame_turning(frame: FloatArray | None, origin: FloatArray) -> tuple[FloatA
     return outer @ inner, by_angles
 
 
-def _of_orientations(values: FloatArray, turned: FloatArray, framed: bool) -> FloatArray:
+def _of_orientations(values: FloatArray, turned: FloatArray, framed: bool) -> list[FloatArray]:
     """Mounting (3,) with which a sensor reads these orientations."""
     platform, sensor = orientation.rotations(turned), orientation.rotations(values)
     frame = np.eye(3)
@@ -259,11 +266,14 @@ def _of_orientations(values: FloatArray, turned: FloatArray, framed: bool) -> Fl
         turnings = [orientation.between(each, each[first]) for each in (values, turned)]
         frame = of_directions(*turnings)
     mountings = platform.transpose(0, 2, 1) @ frame.T @ sensor
-    return angles_of(nearest_rotations(mountings.sum(axis=0)))
+    return [angles_of(nearest_rotations(mountings.sum(axis=0)))]
 
 
-def _of_tilts(values: FloatArray, turned: FloatArray, framed: bool) -> FloatArray:
-    """Mounting (3,) with which a sensor reads these tilts, whichever side up."""
+def _of_tilts(values: FloatArray, turned: FloatArray, framed: bool) -> list[FloatArray]:
+    """Mountings (3,) with which a sensor reads these tilts, whichever side up.
+
+    The upright one first where the nominal machine cannot tell them apart.
+    """
     up = orientation.rotations(turned)[:, 2, :]  # the vertical in platform axes
     level = np.sin(values)
     rest = np.sqrt(np.maximum(0.0, 1.0 - (level**2).sum(axis=1)))
@@ -272,5 +282,5 @@ def _of_tilts(values: FloatArray, turned: FloatArray, framed: bool) -> FloatArra
         seen = np.column_stack([level, side * rest])
         turn = of_directions(up, seen)
         trials.append((float(((seen @ turn.T - up) ** 2).sum()), turn))
-    upright, hanging = trials
-    return angles_of(upright[1] if upright[0] <= hanging[0] else hanging[1])
+    most = max(_ALIKE**2 * min(squares for squares, _ in trials), len(up) * _EXACT**2)
+    return [angles_of(turn) for squares, turn in trials if squares <= most]

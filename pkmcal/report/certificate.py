@@ -11,6 +11,7 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray, rms
 from pkmcal.calibration.identification import Identification
+from pkmcal.core.library import POSE
 from pkmcal.effects.expansion import REFERENCE, coefficients, temperatures
 from pkmcal.estimation.identifiability import listed
 from pkmcal.estimation.uncertainty import stated_variances
@@ -292,12 +293,24 @@ def _expansion(found: Identification, stated: Statement) -> str:
     return ""
 
 
-def _extent(positions: FloatArray) -> dict[str, list[float]]:
-    """State the extent of the tool's positions along each axis, mm."""
-    if not len(positions):
+def _extent(poses: FloatArray) -> dict[str, list[float]]:
+    """State the extent of the tool's poses (N, 6) along each coordinate, mm and rad."""
+    if not len(poses):
         return {}
-    ends = zip(positions.min(axis=0).tolist(), positions.max(axis=0).tolist(), strict=True)
-    return {axis: list(pair) for axis, pair in zip("xyz", ends, strict=True)}
+    ways = [(way.min(), way.max()) for way in poses.T[:3]]
+    turns = [_arc(angles) for angles in poses.T[3:]]
+    ends = np.array([*ways, *turns]).tolist()
+    return dict(zip(POSE, ends, strict=True))
+
+
+def _arc(angles: FloatArray) -> tuple[float, float]:
+    """The ends of the shortest arc that holds all angles, rad; its middle is within half a turn."""
+    ordered = np.sort(angles % (2 * np.pi))
+    gaps = np.diff(ordered, append=ordered[0] + 2 * np.pi)
+    first = (int(np.argmax(gaps)) + 1) % len(ordered)
+    length = 2 * np.pi - gaps.max()
+    low = ordered[first] - 2 * np.pi * round((ordered[first] + length / 2) / (2 * np.pi))
+    return low, low + length
 
 
 def _over_measured(
@@ -311,7 +324,7 @@ def _over_measured(
         "expanded_uncertainty": made.expanded,
         "coverage": made.coverage,
         "poses": len(predicted),
-        "extent": _extent(found.fit.end.pose[:, :3]),
+        "extent": _extent(found.fit.end.pose),
     }
 
 
@@ -319,7 +332,7 @@ def as_data(
     found: Identification,
     stated: Statement,
     predicted: FloatArray,
-    positions: FloatArray,
+    tools: FloatArray,
     where: str = "",
     measured: FloatArray = _NOWHERE,
     left_out: int = 0,
@@ -330,8 +343,8 @@ def as_data(
     ----------
     found, stated, predicted
         As `budget` takes them.
-    positions : ndarray (N, 3)
-        Of the tool at the poses of `predicted`, mm.
+    tools : ndarray (N, 6)
+        Poses of the tool where `predicted` is, mm and rad.
     where : str
         How these poses were drawn.
     measured : ndarray (K,)
@@ -347,7 +360,7 @@ def as_data(
         worst = {
             "expanded_uncertainty": there.expanded,
             "coverage": there.coverage,
-            "position": positions[k].tolist(),
+            "position": tools[k, :3].tolist(),
         }
     return {
         **stated.texts,
@@ -359,7 +372,7 @@ def as_data(
         "standard_uncertainty": made.combined,
         "expanded_uncertainty": made.expanded,
         "region": where,
-        "extent": _extent(positions),
+        "extent": _extent(tools),
         "measured": _over_measured(found, stated, measured),
         "coverage_factor": made.factor,
         "coverage": made.coverage,

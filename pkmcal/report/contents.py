@@ -36,8 +36,8 @@ class WorkspaceAccuracy:
     ----------
     poses : ndarray (N, 6)
         Where, mm and rad; of an arm joint coordinates (N, n).
-    positions : ndarray (N, 3)
-        Of the tool there, mm.
+    tools : ndarray (N, 6)
+        Poses of the tool there, mm and rad.
     accuracy : ndarray (N,)
         inf where the measurements do not determine it.
     where : str
@@ -45,7 +45,7 @@ class WorkspaceAccuracy:
     """
 
     poses: FloatArray
-    positions: FloatArray
+    tools: FloatArray
     accuracy: FloatArray
     where: str
 
@@ -333,7 +333,7 @@ def over_the_workspace(
 ) -> tuple[WorkspaceAccuracy, Slice | None]:
     """Predict the accuracy over the workspace from the covariance."""
     accuracy = expected(found, places.poses)
-    sampled = WorkspaceAccuracy(places.poses, places.positions, accuracy, places.where)
+    sampled = WorkspaceAccuracy(places.poses, places.tools, accuracy, places.where)
     if places.area is None:
         return sampled, None
     area = places.area

@@ -153,7 +153,7 @@ def accuracy(sampled: WorkspaceAccuracy, area: Slice | None) -> Figure:
         _map(left, area.axes, area.values, area.accuracy, title)
     else:
         finite = np.isfinite(sampled.accuracy)
-        x, y = sampled.positions[finite, :2].T
+        x, y = sampled.tools[finite, :2].T
         marks = left.scatter(x, y, c=sampled.accuracy[finite], cmap="viridis", s=12)
         figure.colorbar(marks, ax=left)
         left.set(xlabel="x [mm]", ylabel="y [mm]")

@@ -42,8 +42,8 @@ class Places:
     ----------
     poses : ndarray (N, 6)
         mm and rad; of an arm joint coordinates (N, n).
-    positions : ndarray (N, 3)
-        Of the tool there, mm.
+    tools : ndarray (N, 6)
+        Poses of the tool there, mm and rad.
     where : str
         How the poses were chosen.
     area : Area or None
@@ -51,7 +51,7 @@ class Places:
     """
 
     poses: FloatArray
-    positions: FloatArray
+    tools: FloatArray
     where: str
     area: Area | None
 
@@ -63,9 +63,9 @@ def in_the_workspace(found: Identification) -> Places | str:
         q = found.fit.equations.table.actuators
         shape = (_DRAWN, q.shape[1])
         random = np.random.default_rng(0).uniform(q.min(axis=0), q.max(axis=0), shape)
-        positions = as_machine(machine).forward(random).pose[:, :3]
+        tools = as_machine(machine).forward(random).pose
         where = f"{_DRAWN} joint positions drawn within the range that was measured"
-        return Places(random, positions, where, None)
+        return Places(random, tools, where, None)
     where = f"{_DRAWN} poses drawn in the workspace, {100 * _SHARE:.0f} % of the way to its ends"
     if _endless(machine):
         machine = machine.within(_measured_box(found, machine))
@@ -77,11 +77,11 @@ def in_the_workspace(found: Identification) -> Places | str:
         return str(error)
     axes = [name for name in ends if name in "xyz" and ends[name][0] < ends[name][1]][:2]
     if len(axes) < 2:
-        return Places(poses, poses[:, :3], where, None)
+        return Places(poses, poses, where, None)
     grid = workspace(machine, {name: (*ends[name], _CELLS) for name in axes})
     names, values = (axes[0], axes[1]), (grid.values[0], grid.values[1])
     area = Area(names, values, grid.inside, grid.poses[grid.inside])
-    return Places(poses, poses[:, :3], where, area)
+    return Places(poses, poses, where, area)
 
 
 def _endless(robot: Robot) -> bool:

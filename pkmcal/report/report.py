@@ -90,9 +90,9 @@ def gather(
         accuracy, area = contents.over_the_workspace(found, places)
     signed = None
     if stated is not None:
-        sure, at, region, unsure = np.empty(0), np.empty((0, 3)), "", 0
+        sure, at, region, unsure = np.empty(0), np.empty((0, 6)), "", 0
         if accuracy is not None:
-            sure, at = accuracy.predicted, accuracy.positions[np.isfinite(accuracy.accuracy)]
+            sure, at = accuracy.predicted, accuracy.tools[np.isfinite(accuracy.accuracy)]
             region, unsure = accuracy.where, len(accuracy.accuracy) - len(sure)
         measured = contents.over_the_measured(found)
         signed = certificate.as_data(found, stated, sure, at, region, measured, unsure)

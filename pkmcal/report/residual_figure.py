@@ -182,7 +182,8 @@ def _quantiles(panel: Axes, found: Identification) -> None:
     from scipy.special import ndtri
 
     estimate = found.fit.estimate
-    weights = np.repeat(estimate.weights, estimate.state.loss.components)
+    components = found.fit.estimator.equations.blocks.components
+    weights = np.repeat(estimate.weights, components)
     taken = estimate.change(estimate.half)
     redundancy = 1.0 - weights * np.einsum("ij,ij->i", taken, taken)
     checked = redundancy > 1e-6  # the others are fitted exactly, whatever was measured

@@ -32,7 +32,8 @@ def measured_places(equations: Equations, end: Evaluation) -> FloatArray:
     """Return the measured points of all rows in the robot's base frame, mm (N, 3)."""
     parts = []
     for i in range(len(equations.table.sets)):
-        target = equations.prediction.arguments_of(i, end.theta).get("target")
+        point = next(iter(equations.prediction.points[i]), "")
+        target = equations.prediction.arguments_of(i, end.theta).get(point)
         if target is None:
             parts.append(end.pose[equations.table.pose_of[i], :3])
         else:

@@ -6,13 +6,11 @@ measurement: 5.1.2 (combination), G.4.1 (Welch and Satterthwaite), G.3 (coverage
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
-from pkmcal.exceptions import ArgumentError
 from pkmcal.statistics.distributions import MANY
 
 Distribution = Literal["normal", "rectangular", "triangular", "U-shaped"]
@@ -104,21 +102,6 @@ class Budget:
         return float(1.0 - 2.0 * stdtr(min(self.dof, MANY), -self.factor))
 
 
-def coverage_factor(probability: float, dof: float) -> float:
-    """Factor k whose interval has this probability, by Student's t.
-
-    Examples
-    --------
-    >>> round(coverage_factor(0.99, 16), 2), round(coverage_factor(0.95, float("inf")), 2)
-    (2.92, 1.96)
-    """
-    from scipy.special import stdtrit
-
-    if not 0.0 < probability < 1.0:
-        raise ArgumentError(f"probability must be between 0 and 1, found {probability!r}")
-    return float(stdtrit(min(dof, MANY), 0.5 + probability / 2.0))
-
-
 def standard(half_width: float, distribution: Distribution) -> float:
     """Standard uncertainty of a half width with a distribution; of a normal one it is itself.
 
@@ -128,17 +111,3 @@ def standard(half_width: float, distribution: Distribution) -> float:
     0.5774
     """
     return half_width / DIVISORS[distribution]
-
-
-def pooled(variances: Sequence[float], freedoms: Sequence[float]) -> tuple[float, float]:
-    """Variance and degrees of freedom of several estimates of one variance; NaN and 0 of none.
-
-    Examples
-    --------
-    >>> pooled([4.0, 1.0], [10.0, 20.0])
-    (2.0, 30.0)
-    """
-    total = float(sum(freedoms))
-    if not total > 0:
-        return float("nan"), 0.0
-    return float(np.dot(variances, freedoms)) / total, total

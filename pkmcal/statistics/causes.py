@@ -6,13 +6,15 @@ first; the others are then tested beside it. All chances are times the number of
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pkmcal.arrays import FloatArray
 from pkmcal.statistics.linear_fit import LinearFit
 from pkmcal.statistics.score_test import Beside, Columns, Score, beside
+from pkmcal.statistics.weighed import Weighed
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,54 +31,104 @@ class Explained:
         Share by which the rms of the residuals falls with it, beside the causes before it.
     shift : float
         How far it moves the parameters, in their standard deviations, rms.
-    also : tuple of int
+    spent : tuple of int
         Causes that explain something, and nothing any more beside this one.
+    also : tuple of int
+        Those of them that would do as well: nor does this one explain anything beside them.
     """
 
     cause: int
     chance: float
     gain: float
     shift: float
+    spent: tuple[int, ...]
     also: tuple[int, ...]
 
 
-def causes(fit: LinearFit, columns: Sequence[Columns], chance: float, most: int) -> list[Explained]:
+def causes(
+    weighed: Weighed, columns: Sequence[Columns], chance: float, most: int
+) -> list[Explained]:
     """Search forward for causes, at most `most`, each by chance less than `chance` in all.
+
+    One that explains nothing any more beside those that were found after it is left out again.
 
     Parameters
     ----------
-    fit : LinearFit
-        The fit.
+    weighed : Weighed
+        The fit, with weights for tests.
     columns : sequence of Columns
-        Of each cause; those that are all 0 do not count.
+        Of each cause, by the fit without these weights; those that are all 0 do not count.
     """
-    found: list[Explained] = []
-    begun = ((k, beside(fit, own)) for k, own in enumerate(columns))
+    fit = weighed.fit
+    begun = ((k, beside(fit, weighed.columns(own))) for k, own in enumerate(columns))
     left = {k: each for k, each in begun if each is not None}
+    limit = chance / max(len(left), 1)
     count = len(left)
-    limit = chance / max(count, 1)
+    found = _forward(weighed, left, limit, most)
+    while (spent := _explained_by_others(left, found, limit)) is not None:
+        left.pop(spent)
+        found = _forward(weighed, left, limit, most)
+    return [replace(each, chance=min(1.0, each.chance * count)) for each in found]
+
+
+def _forward(
+    weighed: Weighed, left: Mapping[int, Beside], limit: float, most: int
+) -> list[Explained]:
+    """Take the cause that explains most, then the next beside it; chances are those of each."""
+    found: list[Explained] = []
+    fit = weighed.fit
     while left and len(found) < most:
         scores = {k: _sure(each, limit) for k, each in left.items()}
         known = {k: each for k, each in scores.items() if each is not None}
         if not known:
             break
         best = min(known, key=lambda k: (known[k].chance, -known[k].drop))
-        score, taken = known[best], left.pop(best)
-        after = _with(taken, score)
-        tested = {k: beside(after, each.columns) for k, each in left.items()}
-        also = [k for k in known if k != best and _sure(tested[k], limit) is None]
+        score, taken = known[best], left[best]
+        after = taken_along(taken, score)
+        tested = {k: beside(after, each.columns) for k, each in left.items() if k != best}
+        spent = [k for k in known if k != best and _sure(tested[k], limit) is None]
+        also = [
+            k for k in spent
+            if _sure(beside(taken_along(left[k], known[k]), taken.columns), limit) is None
+        ]  # fmt: skip
         found.append(
             Explained(
                 best,
-                min(1.0, score.chance * count),
-                1.0 - float(np.sqrt(max(1.0 - score.drop / fit.squares, 0.0))),
+                score.chance,
+                1.0 - _size(weighed, fit.residual - score.explained) / _size(weighed, fit.residual),
                 _shift(taken, score),
+                tuple(spent),
                 tuple(also),
             )
         )
         fit = after
-        left = {k: each for k, each in tested.items() if each is not None and k not in also}
+        left = {k: each for k, each in tested.items() if each is not None and k not in spent}
     return found
+
+
+def _explained_by_others(
+    left: Mapping[int, Beside], found: Sequence[Explained], limit: float
+) -> int | None:
+    """The first cause that explains nothing beside those that were found after it, if any."""
+    for place, each in enumerate(found[:-1]):
+        others = [other.cause for k, other in enumerate(found) if k != place]
+        alone: Beside | None = left[others[0]]
+        for other in others[1:]:
+            score = None if alone is None else alone.score()
+            if alone is None or score is None:
+                break
+            alone = beside(taken_along(alone, score), left[other].columns)
+        score = None if alone is None else alone.score()
+        if alone is None or score is None:
+            continue
+        if _sure(beside(taken_along(alone, score), left[each.cause].columns), limit) is None:
+            return each.cause
+    return None
+
+
+def _size(weighed: Weighed, residual: FloatArray) -> float:
+    """Norm of residuals in units of the fit without the weights."""
+    return float(np.linalg.norm(weighed.unweigh(residual)))
 
 
 def _sure(tested: Beside | None, limit: float) -> Score | None:
@@ -91,7 +143,7 @@ def _sure(tested: Beside | None, limit: float) -> Score | None:
     return score if score is not None and score.chance < limit else None
 
 
-def _with(taken: Beside, score: Score) -> LinearFit:
+def taken_along(taken: Beside, score: Score) -> LinearFit:
     """The fit with the columns of a cause among its parameters."""
     fit, turned = taken.fit, taken.by_basis @ taken.half
     return replace(

@@ -33,13 +33,14 @@ def shared_error_score(fit: LinearFit) -> float:
     About standard normal where errors are independent; -inf where no two equations could share
     one, or the fit has used up what they could show.
     """
-    counts = np.bincount(fit.key).astype(np.float64)
+    keys = fit.key()
+    counts = np.bincount(keys).astype(np.float64)
     freedom = fit.freedom
     if counts.max() < 2 or freedom <= 0:
         return float("-inf")
     inner, by_count, together = np.zeros((fit.design.shape[1],) * 2), 0.0, 0.0
-    for rows in grouped(fit.key):
-        key = fit.key[rows]
+    for rows in grouped(keys):
+        key = keys[rows]
         z = sums(fit.design[rows], key)
         inner += z.T @ z
         by_count += float(counts[key[0] : key[-1] + 1] @ (z**2).sum(axis=1))

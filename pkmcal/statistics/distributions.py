@@ -105,3 +105,16 @@ def chi2_tail(squares: float, freedom: float) -> float:
     from scipy.special import gammaincc
 
     return float(gammaincc(freedom / 2.0, squares / 2.0)) if freedom > 0 else float("nan")
+
+
+def chi2_limit(chance: float, freedom: float) -> float:
+    """Sum of squares that is exceeded with this chance.
+
+    Examples
+    --------
+    >>> round(chi2_limit(0.05, 2.0), 2)
+    5.99
+    """
+    from scipy.special import chdtri
+
+    return float(chdtri(freedom, chance))

@@ -138,19 +138,19 @@ def few_equations(
     reach : ndarray (n, p)
         See `FewEquations`.
     """
-    width = design.shape[1] + 1
-    factors: list[FloatArray] = [np.zeros((0, width)) for _ in range(int(cell.max()) + 1)]
-    counts = np.zeros(len(factors), dtype=np.intp)
+    nothing, factors = np.zeros((0, design.shape[1] + 1)), dict[int, FloatArray]()
+    counts = np.zeros(int(cell.max()) + 1, dtype=np.intp)
     for lot in grouped(key):
         _, first, own = np.unique(key[lot], return_index=True, return_inverse=True)
         rows = use[lot]
         averaged = means(np.column_stack([design[rows], residual[rows]]), own)
         cell_of = cell[rows[first]]
-        counts += np.bincount(cell_of, minlength=len(factors))
-        for k in np.unique(cell_of):
-            factors[k] = triangle(factors[k], averaged[cell_of == k])
-    whole, number = np.concatenate(factors), np.arange(len(factors))
-    of_cell = number.repeat([*map(len, factors)])
+        counts += np.bincount(cell_of, minlength=len(counts))
+        for k in np.unique(cell_of).tolist():
+            factors[k] = triangle(factors.get(k, nothing), averaged[cell_of == k])
+    cells = sorted(factors)
+    whole = np.concatenate([nothing, *(factors[k] for k in cells)])
+    of_cell = np.array(cells, dtype=np.intp).repeat([len(factors[k]) for k in cells])
     return FewEquations(whole[:, :-1], whole[:, -1], of_cell, counts, reach)
 
 

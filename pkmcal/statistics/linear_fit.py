@@ -14,6 +14,7 @@ from functools import cache, cached_property
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, IntArray, lots
+from pkmcal.result import ReadOnly
 from pkmcal.statistics.robust_scale import MET
 from pkmcal.statistics.singular_values import svd
 
@@ -27,7 +28,7 @@ _DENSE = 4  # times as many numbers as equations, below which those there are ar
 
 
 @dataclass(frozen=True, eq=False)
-class LinearFit:
+class LinearFit(ReadOnly):
     """M equations and p parameters, y = A b + e, with prior rows R b ~ N(0, 1).
 
     Attributes
@@ -56,16 +57,15 @@ class LinearFit:
     component: IntArray
     exact: float = 0.0
 
-    @cached_property
     def leverage(self) -> FloatArray:
-        """Share of each equation that its own value decides, (M,)."""
+        """Share of each equation that its own value decides, (M,); computed at each call."""
         shares: FloatArray = np.einsum("ij,ij->i", self.design, self.design)
         return shares
 
-    @property
+    @cached_property
     def freedom(self) -> float:
         """Equations less the parameters that went into them, and less those met exactly."""
-        return round(float(len(self.residual) - self.leverage.sum()) - self.exact, _WHOLE)
+        return round(float(len(self.residual) - self.leverage().sum()) - self.exact, _WHOLE)
 
     @property
     def squares(self) -> float:
@@ -77,9 +77,8 @@ class LinearFit:
         """Number of clusters."""
         return int(self.cluster.max()) + 1
 
-    @cached_property
     def key(self) -> IntArray:
-        """Number of cluster and component of each equation, (M,)."""
+        """Number of cluster and component of each equation, (M,); computed at each call."""
         return numbered(self.cluster, self.component)
 
     def without_idle(self, use: IntArray) -> IntArray:
@@ -344,7 +343,7 @@ def orthonormal(matrix: FloatArray | Sequence[FloatArray]) -> FloatArray:
 def _orthonormal(factor: FloatArray) -> FloatArray:
     """`orthonormal` of a matrix with this factor (k, n): the same AᵀA."""
     _, singular, rows = svd(factor)
-    keep = singular > ROUNDING * singular[0]
+    keep = singular > ROUNDING * singular.max(initial=0.0)  # none of no columns
     found: FloatArray = rows[keep].T / singular[keep]
     return found
 

@@ -147,7 +147,10 @@ class Series:
         every = list(lots(len(self.visit)))
         along = sum(self._onto(self.residual[rows], rows) for rows in every)
         steps = self._factor @ (self._factor.T @ along)
-        return np.concatenate([self.residual[rows] - self._both(steps, rows) for rows in every])
+        left = np.empty(len(self.visit))
+        for rows in every:
+            left[rows] = self.residual[rows] - self._both(steps, rows)
+        return left
 
     def course(self) -> Course | None:
         """Test the series; None where too little is left to say."""
@@ -192,11 +195,13 @@ class Series:
             beside: FloatArray = moved - self._both(steps, rows)
             return beside
 
+        share = self._share(course, freedom / len(self.residual))
+        values *= self._unit
         return Course(
             chance=f_tail(min(explained / taken / variance, 1e300), taken, freedom),
             explained=explained,
-            share=self._share(course, freedom / len(self.residual)),
-            values=values * self._unit,
+            share=share,
+            values=values,
             scatter=np.sqrt(variance) * self._unit,
         )
 

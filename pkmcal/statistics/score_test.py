@@ -21,6 +21,7 @@ from pkmcal.statistics.clusters import Sandwich
 from pkmcal.statistics.distributions import f_tail
 from pkmcal.statistics.linear_fit import LinearFit
 
+_SHARED = 1e-3  # chance by errors that clusters share, from which on a jump is not told
 LEFT = 1e-6  # share of a column that must be left beside others, for it to say anything of its own
 
 # Derivatives of the predicted values to held numbers, whitened: equations in their order, and their
@@ -169,7 +170,7 @@ class Jump:
         By how much.
     chance : float
         How likely as much would be explained if they were always the same, times the number of
-        visits at which it was looked for.
+        visits at which it was looked for; 1 where errors that clusters share may explain it.
     """
 
     at: int
@@ -180,7 +181,8 @@ class Jump:
 def jump(fit: LinearFit, columns: FloatArray, visit: IntArray, fewest: int) -> Jump | None:
     """Find from which visit on other numbers explain most; None where nothing can be told.
 
-    Errors count as independent.
+    Errors count as independent; what is found by them has to stand against those that clusters
+    share, too: corners of a tag that are off together look like a jump to many equations.
 
     Parameters
     ----------
@@ -223,7 +225,23 @@ def jump(fit: LinearFit, columns: FloatArray, visit: IntArray, fewest: int) -> J
         return None
     at = min(tried, key=lambda each: (tried[each].chance, -tried[each].drop))
     best = tried[at]
-    return Jump(at, best.half @ best.along, min(1.0, len(tried) * best.chance))
+    own = columns_of(np.where((visit >= at)[:, None], columns, 0.0))
+    stands = _by_clusters(replace(best, columns=own), min(at, visits - at)) < _SHARED
+    return Jump(at, best.half @ best.along, min(1.0, len(tried) * best.chance) if stands else 1.0)
+
+
+def _by_clusters(jump: Beside, fewer: int) -> float:
+    """Chance of what a jump explains, by the variance that clusters show, mean over its numbers.
+
+    Their whole covariance, as `Beside.score` has it, is not told by the few visits beside a jump.
+    """
+    k, fit = len(jump.along), jump.fit
+    left = replace(fit, residual=fit.residual - jump.own @ jump.along)
+    p = fit.design.shape[1]
+    variance = float(np.trace(Sandwich(left, jump.own).data[p:, p:])) / k
+    if not variance > 0.0 or fewer < 2:
+        return 1.0
+    return f_tail(min(jump.drop / k / variance, 1e300), k, k * (fewer - 1))
 
 
 def score_test(fit: LinearFit, columns: Columns) -> Score | None:

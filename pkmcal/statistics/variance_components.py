@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray, lots
-from pkmcal.statistics.distributions import chi2_tail
+from pkmcal.statistics.distributions import chi2_limit, chi2_tail
 from pkmcal.statistics.linear_fit import LinearFit
 
 _LEAST_FREEDOM = 15.0  # degrees of freedom for each class that is told apart
@@ -133,9 +133,10 @@ class _Model:
         for some in lots(len(classes)):
             design, residual, of = fit.design[some], fit.residual[some], classes[some]
             for c in range(len(self.count)):
-                part = design[of == c]
+                mine = of == c
+                part = design[mine]
                 self._inner[c] += part.T @ part
-                self._pulls[c] += part.T @ residual[of == c]
+                self._pulls[c] += part.T @ residual[mine]
         self._prior, self._missed = fit.prior, prior_residual
         self._known, self._drawn = fit.prior.T @ fit.prior, fit.prior.T @ prior_residual
         self.square = np.bincount(classes, fit.residual**2)
@@ -252,11 +253,9 @@ def told_apart(
         if here is not None and finest.score_chance(here, classes, few) > _NO_SLOPE:
             continue
         own = finest if classes is shown[-1] else _Model(fit, classes, prior_residual)
+        least = present.likelihood + 0.5 * chi2_limit(_DIFFERENT, many - few)
         other = own.highest(fit.freedom)
-        if other is None:
-            continue
-        gained = 2.0 * (other.likelihood - present.likelihood)
-        if chi2_tail(gained, many - few) < _DIFFERENT:
+        if other is not None and other.likelihood > least:
             better = _at_best(classes, other)
             if better is not None:
                 present, found = other, better

@@ -35,7 +35,11 @@ def of_robot(
 
 def of_arm(arm: SerialArm, axes: Axes | None, theta: ArrayLike | None, colour: str | None) -> Axes:
     """Draw an arm at joint coordinates, by default zero, and return the axes."""
-    q = np.zeros(arm.n_joints) if theta is None else as_rows("theta", theta, arm.n_joints)[0][0]
+    q = (
+        np.zeros(arm.n_actuators)
+        if theta is None
+        else as_rows("theta", theta, arm.n_actuators)[0][0]
+    )
     drawn = skeleton(arm, q, np.zeros(6))
     assert drawn is not None  # an arm is somewhere at all coordinates
     return _drawn(drawn, axes, False, colour)

@@ -16,6 +16,7 @@ from pkmcal.kinematics.workspace import good_poses, reach
 
 BEYOND = 0.15  # of a range: sliders go beyond it, so that one sees what stops there
 _SAME = 1e-6  # of the machine's length: a pose that is found again
+_DECIMALS = 9  # of a mode's pose, mm and rad: more would be another processor's
 _CLOUD = 500  # points, at most
 _DRAWS = 2500
 _ANGLE, _LENGTH = np.radians(30.0), 0.2  # where the machine says nothing: rad, and of its size
@@ -97,7 +98,7 @@ def modes(robot: Robot) -> dict[str, Any]:
         there = robot.forward(np.repeat(q[None], len(poses), axis=0), poses)
         off = np.linalg.norm(there.pose[:, :3] - poses[:, :3], axis=1)
         poses = poses[there.ok & (off < _SAME * robot.length)]
-    return {"poses": poses.tolist(), "complete": bool(found.complete)}
+    return {"poses": np.round(poses, _DECIMALS).tolist(), "complete": bool(found.complete)}
 
 
 def cloud(robot: Robot, ranges: dict[str, tuple[float, float]]) -> tuple[FloatArray, FloatArray]:

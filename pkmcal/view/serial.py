@@ -23,7 +23,7 @@ def data(arm: SerialArm) -> dict[str, Any]:
     ends = np.where(turning, np.pi, _SLIDES * arm.length)
     size = float(np.ptp(np.vstack([np.zeros(3), arm.points, arm.home[:3, 3]]), axis=0).max())
     size = max(size, arm.length)
-    moved = POSE if arm.n_joints >= 6 else POSE[:3]
+    moved = POSE if arm.n_actuators >= 6 else POSE[:3]
     home = arm.forward(start)
     reach = [[-1.5 * size, 1.5 * size] if name in "xyz" else [-np.pi, np.pi] for name in moved]
     return {
@@ -38,11 +38,16 @@ def data(arm: SerialArm) -> dict[str, Any]:
         "poses": reach,
         "reach": reach,
         "actuators": [
-            _slider(unit, end, low, high)
-            for unit, end, (low, high) in zip(
-                arm.actuator_units, ends.tolist(), limits.tolist(), strict=True
+            _slider(unit, end, low, high) | {"name": name}
+            for unit, end, (low, high), name in zip(
+                arm.actuator_units,
+                ends.tolist(),
+                limits.tolist(),
+                arm.actuator_names or [None] * arm.n_actuators,
+                strict=True,
             )
         ],
+        "shares": arm.followers.shares.tolist() if arm.followers else None,
         "joints": [
             {"kind": "P" if kind == "prismatic" else "R", "name": name}
             for kind, name in zip(arm.kinds, arm.joint_names or [None] * arm.n_joints, strict=True)

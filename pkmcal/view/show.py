@@ -68,7 +68,7 @@ def show(
         instance("robot", robot, Robot, " or a SerialArm")
     rows = None
     if poses is not None:
-        rows = as_rows("poses", poses, robot.n_joints if isinstance(robot, SerialArm) else 6)[0]
+        rows = as_rows("poses", poses, robot.n_actuators if isinstance(robot, SerialArm) else 6)[0]
     content = sealed(html(robot, rows).encode(), ".html")
     if path is not None:
         place = Path(arguments.path("path", path))

@@ -73,8 +73,10 @@ def _placed(robot: Robot, lines: Sequence[FloatArray], platform: FloatArray) -> 
 def _chain(arm: SerialArm, q: FloatArray) -> FloatArray:
     """Base, a point on every joint's axis, and the tool."""
     at = [np.zeros(3)]
+    tool = arm.forward(q)[:3, 3]
+    q = arm.joint_coordinates(q)
     if arm.laws is not None:
-        q, arm = arm.laws.moved(q[None])[0], arm.rigid
+        q = arm.laws.moved(q[None])[0]
     for i in range(1, arm.n_joints + 1):
         home = np.eye(4)
         home[:3, 3] = arm.points[i - 1]
@@ -86,7 +88,7 @@ def _chain(arm: SerialArm, q: FloatArray) -> FloatArray:
             joint_errors=arm.joint_errors[:i],
         )
         at.append(part.forward(q[:i])[:3, 3])
-    at.append(arm.forward(q)[:3, 3])
+    at.append(tool)
     return np.array(at)
 
 

@@ -85,7 +85,11 @@ def of_arm(arm: SerialArm) -> str:
     """A sentence about a serial arm."""
     kinds = Counter(arm.kinds)
     joints = " and ".join(f"{_count(n)} {kind}" for kind, n in kinds.items())
-    return f"An arm of {joints} joint{'s' * (arm.n_joints > 1)}, one after the other."
+    led = [f"joint {joint} follows joint {leader}" for joint, leader, _ in arm.followers.ratios]
+    return (
+        f"An arm of {joints} joint{'s' * (arm.n_joints > 1)}, one after the other"
+        f"{': ' * bool(led)}{', '.join(led)}."
+    )
 
 
 def of_laws(arm: SerialArm, theta: FloatArray) -> str:

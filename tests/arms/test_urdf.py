@@ -135,12 +135,6 @@ def test_all_else_stays_in_the_file(source: Path, tmp_path: Path) -> None:
             {"tip": "tool0"},
             "'j2' is floating, which a serial arm has not",
         ),
-        (
-            '<axis xyz="0 1 1"/>',
-            '<axis xyz="0 1 1"/><mimic joint="j1" multiplier="-2"/>',
-            {"tip": "tool0"},
-            r"joint 'j2' follows -2 · j1 \(mimic\), .* without its <mimic> it is one, whose column",
-        ),
         ('name="j2"', 'name="j1"', {"tip": "tool0"}, "several joints are named 'j1'"),
         (
             '<child link="camera"/>',

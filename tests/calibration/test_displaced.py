@@ -42,7 +42,7 @@ def read(
 
 
 def displacement(found: pk.Identification) -> DisplacedTarget:
-    test = displaced_target(found.fit)
+    test = displaced_target(found)
     assert test is not None
     return test
 
@@ -123,5 +123,5 @@ def test_of_sound_calibrations_hardly_any_is_said_to_have_one(
 def test_targets_that_are_found_along_and_a_single_one_are_not_tested(hexapod: pk.Robot) -> None:
     still = np.zeros(3)
     (one, *_), whole = read(hexapod, 3, still, together=False), read(hexapod, 3, still)
-    assert displaced_target(pk.identify(hexapod, one).fit) is None
-    assert displaced_target(pk.identify(hexapod, whole, "offset*", unknown="target").fit) is None
+    assert displaced_target(pk.identify(hexapod, one)) is None
+    assert displaced_target(pk.identify(hexapod, whole, "offset*", unknown="target")) is None

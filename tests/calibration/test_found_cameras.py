@@ -128,6 +128,7 @@ def test_the_machine_by_itself_is_known_as_well_as_drawn_machines_differ(
 def _apart(pose: np.ndarray, onto: np.ndarray) -> np.ndarray:
     """Distances (N,) of places after the best finite motions of base and platform."""
     at, wanted = pk.screw.from_pose(pose), pk.screw.from_pose(onto)
+    length = pk.load("hexapod").length
 
     def moved(x: np.ndarray) -> np.ndarray:
         return pk.screw.exp(x[:6]) @ at @ pk.screw.exp(x[6:])
@@ -136,7 +137,6 @@ def _apart(pose: np.ndarray, onto: np.ndarray) -> np.ndarray:
         there = moved(x)
         turned = there[:, :3, :3] @ wanted[:, :3, :3].transpose(0, 2, 1)
         angles = [turned[:, i, j] - turned[:, j, i] for i, j in ((2, 1), (0, 2), (1, 0))]
-        length = pk.load("hexapod").length
         return np.hstack([np.stack(angles, 1) * 0.5 * length, (there - wanted)[:, :3, 3]]).ravel()
 
     from scipy.optimize import least_squares

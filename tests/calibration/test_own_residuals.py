@@ -10,6 +10,9 @@ import pytest
 
 import pkmcal as pk
 
+from ..sweeps import sweep
+
+NOISE = np.random.default_rng(0)
 TIED = "examples/linear-delta/robot.toml"
 
 
@@ -22,7 +25,7 @@ def measured(robot: pk.Robot, true: pk.Robot, seed: int = 0) -> pk.Measurements:
     return pk.VirtualMachine(true, noise=0.02, angle_noise=5e-5, seed=seed).measure(q)
 
 
-@pytest.mark.parametrize("machine", ["hexapod", "rbt-6t03p", "rotary-delta"])
+@sweep("machine", ["hexapod", "rbt-6t03p", "rotary-delta"], quick=["rotary-delta"])
 def test_a_residual_of_a_length_is_the_prior_of_that_length(machine: str) -> None:
     """Two ways: the package's own functions of numbers, with exact derivatives, and one's own."""
     robot = pk.load(machine)
@@ -70,6 +73,30 @@ def test_derivatives_that_are_brought_are_those_by_differences_through_ties_and_
     np.testing.assert_allclose(
         found[0].fit.parameters.prior_rows(theta), chosen.prior_rows(theta), rtol=1e-6, atol=1e-6
     )
+
+
+@pytest.mark.parametrize("times", [-1.0, 0.5, 0.9, 1.1, 10.0])
+def test_a_derivative_that_is_not_that_of_the_values_is_refused_by_name(times: float) -> None:
+    robot = pk.load("hexapod")
+
+    def near(n: Mapping[str, float]) -> tuple[list[float], dict[str, Any]]:
+        by_second = [0.0, times * 2.0 * n["offset2"] / 0.01]
+        values = [n["offset1"] / 0.001, (n["offset2"] ** 2 - 0.2) / 0.01]
+        return values, {"offset1": [1000.0, 0.0], "offset2": by_second}
+
+    start = robot.replace({"offset2": 0.4})
+    with pytest.raises(ValueError, match="near: its derivative by offset2 is stated as"):
+        pk.identify(start, measured(start, start), "offset*", residuals=[near])
+
+
+def test_the_kink_of_a_residual_is_no_wrong_derivative() -> None:
+    """Within a step of differences of it."""
+    robot = pk.load("hexapod").replace({"offset1": 0.0005})
+
+    def near(n: Mapping[str, float]) -> tuple[float, dict[str, float]]:
+        return abs(n["offset1"]), {"offset1": float(np.sign(n["offset1"]))}
+
+    assert pk.identify(robot, measured(robot, robot), "offset*", residuals=[near]).converged
 
 
 def test_a_residual_brings_numbers_that_are_found() -> None:
@@ -120,6 +147,15 @@ def test_a_residual_that_is_wrong_is_said_to_contradict_the_measurements() -> No
         (lambda n: "five", "found 'five'"),
         (lambda n: (n["offset1"], {"offset9": 1.0}), "offset9"),
         (lambda n: (n["offset1"], {"offset1": [1.0, 2.0]}), "offset1"),
+        (lambda n: (n["offset1"], {"offset1": "one"}), "by 'offset1' must be"),
+        (lambda n: 1e200 * n["offset1"], "below 1e\\+50"),
+        (lambda n: (n["offset1"], {"offset1": 1e200}), "below 1e\\+50"),
+        (lambda n: 1 / 0, "<lambda> failed with ZeroDivisionError"),
+        (lambda n: [n["offset1"]][1], "<lambda> failed with IndexError"),
+        (lambda n: n + 1, "<lambda> failed with TypeError"),
+        (lambda n, m: 0.0, "<lambda> failed with TypeError"),
+        (lambda n: dict[str, float]()["of its own"], "<lambda> failed with KeyError: 'of its own'"),
+        (lambda n: n["offset1"] + NOISE.normal(), "other values"),
     ],
 )  # fmt: skip
 def test_a_residual_that_does_not_fit_is_refused(residual: Any, said: str) -> None:

@@ -363,7 +363,7 @@ def test_measurements_of_another_machine_are_refused(points: Measurements) -> No
 
 
 def test_points_alone_have_no_attachment(paper: Robot, points: Measurements) -> None:
-    with pytest.raises(ValueError, match="attachment: distances alone have one"):
+    with pytest.raises(ValueError, match="attachment: positions have none, it cannot be unknown"):
         identify(paper, points, unknown="attachment")
 
 

@@ -10,13 +10,16 @@ import pytest
 
 from pkmcal.diagnostics.machine import CHECKS
 from pkmcal.readings.registry import KINDS
+from pkmcal.readings.unknowns import Nature
 
 CHECK = {check.name: check for check in CHECKS}
 
 
 def said(name: str, **fit: Any) -> list[str]:
     """What a check says of a calibration of which only some parts matter."""
-    found: Any = SimpleNamespace(fit=SimpleNamespace(**fit))
+    sure = {"free": fit.pop("free", ()), "interval95": fit.pop("interval95", np.zeros((0, 2)))}
+    sure["columns"] = np.arange(len(sure["free"]))
+    found: Any = SimpleNamespace(fit=SimpleNamespace(**fit), **sure)
     return [CHECK[name].say(found, finding) for finding in CHECK[name].run(found)]
 
 
@@ -69,6 +72,10 @@ def test_a_target_is_far_beyond_thrice_the_largest_of_reach_size_and_geometry(wh
         chosen: Any = SimpleNamespace(
             robot=robot,
             nuisance={("anchor", "9"): 0, ("target", "west"): 1, ("attachment", "2"): 2},
+            natures={
+                ("target", "west"): Nature("platform"),
+                ("attachment", "2"): Nature("platform"),
+            },
             number_of=np.array([0, -1, -1, 1, -1, -1, 2, -1, -1]),
             names=["anchor9.x", "", "", "targetwest.x@one", "", "", "attachment2.x", "", ""],
             start=np.array([0.0, 0, 0, 0, 0, stated, 0, 0, 0]),
@@ -88,11 +95,48 @@ def test_numbers_that_moved_by_a_quarter_of_the_machine_are_named_but_loads_are_
     moved = np.array([-99.0, 0.101, 101.0, 5e3, 5e3, 5e3])
     scale = np.array([1.0, 1e-3, 1.0, 1.0, 1.0, 1.0])  # of a gain per mm
     robot = SimpleNamespace(length=400.0)
-    chosen: Any = SimpleNamespace(names=names, scale=scale, geometry=slice(0, 5), robot=robot)
+    units = ("mm", "1", "mm", "N", "mm", "mm")
+    chosen: Any = SimpleNamespace(
+        names=names, units=units, scale=scale, geometry=slice(0, 5), robot=robot
+    )
     start: Any = SimpleNamespace(theta=np.full(6, 7.0))
     end: Any = SimpleNamespace(theta=7.0 + moved)
-    fit = {"parameters": chosen, "start": start, "estimate": SimpleNamespace(evaluation=end)}
+    fit = {
+        "parameters": chosen, "start": start, "estimate": SimpleNamespace(evaluation=end),
+        "end": end, "equations": SimpleNamespace(parameters=chosen),
+    }  # fmt: skip
     (text,) = said("implausible-changes", **fit)
     assert text.startswith("gain2, base3.z moved by up to 101 mm")
     end.theta = 7.0 + 0.9 * moved
     assert said("implausible-changes", **fit) == []
+
+
+def test_numbers_that_are_hardly_told_are_not_named_and_others_are() -> None:
+    """What is within its ± of a plausible change is no fault of a machine.
+
+    Of numbers that are determined only together with others this holds of the part that is.
+    """
+    names = ("base1.x", "gain2", "offset3")
+    chosen: Any = SimpleNamespace(
+        names=names, units=("mm", "1", "mm"), scale=np.array([1.0, 1e-3, 1.0]),
+        geometry=slice(0, 3), robot=SimpleNamespace(length=400.0),
+    )  # fmt: skip
+    moved = np.array([150.0, 0.15, -150.0])
+    end: Any = SimpleNamespace(theta=moved)
+    fit = {
+        "parameters": chosen, "start": SimpleNamespace(theta=np.zeros(3)),
+        "estimate": SimpleNamespace(evaluation=end), "free": names,
+        "end": end, "equations": SimpleNamespace(parameters=chosen),
+    }  # fmt: skip
+    for half, told, named in (
+        (49.0, 1e3, names), (51.0, 0.0, ()), (np.inf, 24.0, names), (np.inf, 27.0, ()),
+    ):  # fmt: skip
+        units = np.array([1.0, 1e-3, 1.0])
+        ends = half * units[:, None]
+        fit["uncertainty"] = SimpleNamespace(
+            matrix=np.diag((told * units) ** 2), freedom=np.full(3, 1e6)
+        )
+        found = said("implausible-changes", interval95=moved[:, None] + ends * [-1, 1], **fit)
+        assert [text.partition(" moved")[0] for text in found] == (
+            [", ".join(named)] if named else []
+        )

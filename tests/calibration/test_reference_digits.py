@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
+from pkmcal.estimation.loss import decline, limits
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.statistics.pseudo_residuals import pseudo_residuals
 
@@ -92,8 +93,10 @@ def test_of_a_hexapod_with_repeats_and_a_holdout(seed: int, loss: str) -> None:
     for number, digit in zip(numbers[1:], digits[1:8], strict=True):
         assert like(float(number), digit)
     if loss == "cauchy":
-        equations, estimate = found.fit.uncertainty.equations, found.fit.estimate
-        decline = estimate.state.loss.decline(estimate.residual)
-        given = estimate.residual, equations.blocks.components, estimate.weights, decline
+        blocks, estimate = found.fit.uncertainty.blocks, found.fit.estimate
+        state, components = estimate.state, blocks.components
+        limit = limits(state.loss, blocks.stands_for, state.width)
+        falls = decline(state.loss, estimate.residual, components, limit)
+        given = estimate.residual, components, estimate.weights, falls
         _, slope, _ = pseudo_residuals(*given, estimate.state.determined.rank)
         assert like(slope, digits[9])

@@ -58,13 +58,24 @@ def sound() -> pk.Measurements:
     return pictures()
 
 
+@pytest.fixture(scope="module")
+def exact(sound: pk.Measurements) -> pk.Identification:
+    """With the lens as it is, held."""
+    return fitted(sound)
+
+
+@pytest.fixture(scope="module")
+def apart(sound: pk.Measurements) -> pk.Identification:
+    """With a stated deviation of each number of the lens."""
+    return fitted(with_lens(sound, lens_sigma=SIGMA))
+
+
 def test_a_stated_lens_that_is_off_is_pulled_back_and_a_held_one_is_not(
-    sound: pk.Measurements,
+    sound: pk.Measurements, exact: pk.Identification
 ) -> None:
     wrong = {"fx": LENS["fx"] + 12.0, "fy": LENS["fy"] + 12.0, "cx": LENS["cx"] - 12.0}
     stated = fitted(with_lens(sound, **wrong, lens_sigma=4 * SIGMA))
     held = fitted(with_lens(sound, **wrong))
-    exact = fitted(sound)
     camera = stated.instruments[0]
     assert isinstance(camera, Camera)
     assert abs(camera.cx - LENS["cx"]) < 5.0 and abs(camera.fx - LENS["fx"]) < 12.0
@@ -74,33 +85,40 @@ def test_a_stated_lens_that_is_off_is_pulled_back_and_a_held_one_is_not(
 
 
 def test_the_surer_the_lens_the_surer_the_numbers_between_held_and_free(
-    sound: pk.Measurements,
+    sound: pk.Measurements, exact: pk.Identification, apart: pk.Identification
 ) -> None:
-    held, free = fitted(sound), fitted(with_lens(sound, lens="all"))
-    at = [
-        fitted(with_lens(sound, lens_sigma=scale * SIGMA)).parameters["frame.z"]["stderr"]
-        for scale in (1e-4, 1.0, 1e4)
-    ]
-    ends = [each.parameters["frame.z"]["stderr"] for each in (held, free)]
+    free = fitted(with_lens(sound, lens="all"))
+    ends, at = (
+        [each.parameters["frame.z"]["stderr"] for each in several]
+        for several in (
+            (exact, free),
+            (
+                fitted(with_lens(sound, lens_sigma=1e-4 * SIGMA)),
+                apart,
+                fitted(with_lens(sound, lens_sigma=1e4 * SIGMA)),
+            ),
+        )
+    )
     assert at == sorted(at)
     np.testing.assert_allclose([at[0], at[2]], ends, rtol=0.02)
 
 
-def test_deviations_and_their_covariance_are_one_statement(sound: pk.Measurements) -> None:
-    one = fitted(with_lens(sound, lens_sigma=SIGMA))
+def test_deviations_and_their_covariance_are_one_statement(
+    sound: pk.Measurements, apart: pk.Identification
+) -> None:
     other = fitted(with_lens(sound, lens_sigma=np.diag(SIGMA**2)))
-    np.testing.assert_array_equal(one.values, other.values)
+    np.testing.assert_array_equal(apart.values, other.values)
 
 
-def test_correlations_of_a_lens_count(sound: pk.Measurements) -> None:
+def test_correlations_of_a_lens_count(sound: pk.Measurements, apart: pk.Identification) -> None:
     covariance = np.diag(SIGMA**2)
     covariance[0, 1] = covariance[1, 0] = (1.0 - 1e-6) * SIGMA[0] * SIGMA[1]
     together = fitted(with_lens(sound, lens_sigma=covariance)).instruments[0]
-    apart = fitted(with_lens(sound, lens_sigma=SIGMA)).instruments[0]
-    assert isinstance(together, Camera) and isinstance(apart, Camera)
+    alone = apart.instruments[0]
+    assert isinstance(together, Camera) and isinstance(alone, Camera)
     moved = together.fx - LENS["fx"], together.fy - LENS["fy"]
     assert moved[0] == pytest.approx(moved[1], abs=0.02)
-    assert abs((apart.fx - LENS["fx"]) - (apart.fy - LENS["fy"])) > 0.02
+    assert abs((alone.fx - LENS["fx"]) - (alone.fy - LENS["fy"])) > 0.02
 
 
 def test_what_is_no_covariance_of_a_lens_is_refused() -> None:

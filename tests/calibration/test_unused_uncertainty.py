@@ -91,7 +91,8 @@ def test_the_cause_of_an_error_of_ones_own_is_not_called_measurements():
             raise ValueError("the table of the pump ends here")
         return numbers["offset1"]
 
-    with pytest.raises(ValueError, match=r"^the table of the pump ends here"):
+    said = r"^residuals: broken failed with ValueError: the table of the pump ends here"
+    with pytest.raises(ValueError, match=said):
         pk.identify(robot, m, "offset*", residuals=broken)
 
 

@@ -17,7 +17,7 @@ from pkmcal.diagnostics.robust_check import RobustCheck
 from pkmcal.diagnostics.verdict import diagnose
 from pkmcal.fitted.held_points import HeldFamily
 from pkmcal.fitted.holdout import HeldOut
-from pkmcal.readings.reading import Family
+from pkmcal.readings.components import Family
 from pkmcal.statistics.holdout_test import HoldoutTest
 
 from ..simulated import hexapod_poses

@@ -56,6 +56,32 @@ def test_an_axis_of_a_u_along_its_rod_is_named() -> None:
     assert said.limbs == (1,) and "second axis of the U limb1.joint1" in said.what
 
 
+@pytest.mark.parametrize(("which", "axis"), [(0, "first"), (1, "second")])
+def test_an_axis_exactly_along_the_rod_is_named_where_the_machine_is_refused(
+    which: int, axis: str
+) -> None:
+    """A U at the platform's end, of limb 3 of a tripod; the S at the base lets the rod turn."""
+    tables = []
+    for i, angle in enumerate(np.radians([10, 130, 250])):
+        way = np.array([np.cos(angle), np.sin(angle), 0.0])
+        base, platform = 400.0 * way, 150.0 * way + [0.0, 0.0, 600.0]
+        rod = (platform - base) / np.linalg.norm(platform - base)
+        side = np.array([-way[1], way[0], 0.0])
+        axes = [np.cross(side, rod), side]
+        if i == 2:
+            axes[which] = rod
+        tables.append({
+            "kind": "chain",
+            "joints": [
+                {"kind": "S", "at": base.tolist()},
+                {"kind": "P", "axis": rod.tolist(), "at": base.tolist(), "actuator": i + 1},
+                {"kind": "U", "at": platform.tolist(), "axes": [each.tolist() for each in axes]},
+            ],
+        })  # fmt: skip
+    with pytest.raises(ValueError, match=rf"limb 3 can move .*: the {axis} axis of the U limb3.j"):
+        made("spatial", {"z": 600.0}, tables)
+
+
 def similar(share: float) -> pk.Robot:
     """A planar machine of four legs whose platform is its base made smaller, but for a share."""
     base = np.array([(-500.0, -400), (520, -380), (480, 420), (-510, 390)])

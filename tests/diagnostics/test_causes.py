@@ -2,16 +2,20 @@
 
 import warnings
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal.diagnostics.cause_columns import CAUSES, possible
+from pkmcal.diagnostics.cause_columns import CAUSES, place_after_place, possible
 from pkmcal.diagnostics.causes import found_causes
 from pkmcal.diagnostics.columns import of_actuators
 from pkmcal.diagnostics.regions import cross_validations
+
+from ..simulated import said_by
+from ..sweeps import sweep
 
 ROBOT = pk.load("hexapod")
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -77,14 +81,27 @@ WRONG = {
 }
 
 
-@pytest.mark.parametrize("name", WRONG)
-def test_a_cause_is_named_where_it_is(name):
-    named = 0
-    for seed in range(4):
-        seen = found_causes(identified(seed, **WRONG[name]))
-        first = (seen[0].name, *seen[0].also) if seen else ()
-        named += any(name in each for each in first)
-    assert named == 4
+@sweep("name, seed", product(WRONG, range(4)), quick=[(name, 0) for name in WRONG])
+def test_a_cause_is_named_where_it_is(name, seed):
+    first, *_ = found_causes(identified(seed, **WRONG[name]))
+    assert any(name in each for each in (first.name, *first.also))
+
+
+@pytest.mark.parametrize("raster", [True, False])
+def test_in_a_raster_warming_is_not_told_from_place_and_the_sentence_says_so(raster):
+    random = np.random.default_rng(3)
+    poses = pk.sample_poses(ROBOT, 48, seed=3, share=0.4)
+    if raster:
+        poses = poses[np.argsort(poses[:, 1])]
+    q = ROBOT.inverse(poses)
+    read = ROBOT.forward(warmed(q)).pose + random.normal(size=(48, 6)) * [*[0.01] * 3, *[3e-5] * 3]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        found = pk.identify(ROBOT, pk.Measurements(q, read, "pose"), "offset*")
+    assert place_after_place(found.fit) == raster
+    said = [each for each in found.verdict.said if each.check == "causes"]
+    (warming,) = [each for each in said if "grew warmer" in each.text]
+    assert ("place after place" in warming.text) == raster
 
 
 def test_targets_that_lean_are_named():
@@ -119,16 +136,20 @@ def test_a_late_machine_is_doubted_and_the_gain_is_that_of_a_fit_with_it():
     assert cause.shift > 1.0
 
 
-@pytest.mark.parametrize("free", ["offset*", ["base*", "platform*", "offset*"]])
-def test_of_sound_machines_hardly_any_cause_is_named(free):
-    named = sum(bool(found_causes(identified(seed, free=free))) for seed in range(40, 70))
-    assert named <= 5  # 5 of 100 are allowed: 6 or more of 30 in 1 of 300 trials
+EVERY = ["base*", "platform*", "offset*"]
+
+
+@sweep("free, draws", [("offset*", 12), ("offset*", 30), (EVERY, 30)], quick=[("offset*", 12)])
+def test_of_sound_machines_hardly_any_cause_is_named(free, draws):
+    """5 of 100 are allowed: 4 or more of 12 in 1 of 450 trials, 6 or more of 30 in 1 of 300."""
+    named = sum(bool(found_causes(identified(40 + k, free=free))) for k in range(draws))
+    assert named <= (3 if draws == 12 else 5)
 
 
 @pytest.mark.parametrize("cause", CAUSES, ids=lambda each: each.name)
 def test_columns_are_derivatives_of_the_readings(cause):
     found = identified(2)
-    columns = {each.name: own for each, own in possible(found.fit)}
+    columns = {each.name: own for each, own in possible(found)}
     lots = [some for _, some in columns[cause.name]()]
     if not lots:
         assert "targets" in cause.name or "joints" in cause.name
@@ -138,26 +159,24 @@ def test_columns_are_derivatives_of_the_readings(cause):
     assert np.isfinite(own).all()
 
 
-def test_regions_that_are_left_out_show_a_wrong_model():
-    free = ["base*", "platform*", "offset*"]
-    for seed in range(3):
-        random = np.random.default_rng(seed)
-        names = ROBOT.geometry.match("gain*")
-        true = ROBOT.replace({name: 1.0 + 2e-3 * random.normal() for name in names})
-        q = ROBOT.inverse(pk.sample_poses(ROBOT, 100, seed=seed, share=0.4))
-        for machine, wrong in ((true, True), (ROBOT, False)):
-            m = pk.VirtualMachine(machine, noise=0.01, seed=seed).measure(q, "pose")
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")
-                found = pk.identify(ROBOT, m, free)
-            (regions,) = cross_validations(found)
-            assert regions.worse == wrong
-            assert not wrong or regions.rms > regions.at_random
-            said = any(each.check == "regions-left-out" for each in found.verdict.said)
-            assert said == wrong
+@sweep("seed", range(3), quick=[0])
+def test_regions_that_are_left_out_show_a_wrong_model(seed):
+    random = np.random.default_rng(seed)
+    names = ROBOT.geometry.match("gain*")
+    true = ROBOT.replace({name: 1.0 + 2e-3 * random.normal() for name in names})
+    q = ROBOT.inverse(pk.sample_poses(ROBOT, 100, seed=seed, share=0.4))
+    for machine, wrong in ((true, True), (ROBOT, False)):
+        m = pk.VirtualMachine(machine, noise=0.01, seed=seed).measure(q, "pose")
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            found = pk.identify(ROBOT, m, EVERY)
+        (regions,) = cross_validations(found)
+        assert regions.worse == wrong
+        assert not wrong or regions.rms > regions.at_random
+        assert bool(said_by(found, "regions-left-out")) == wrong
 
 
-@pytest.mark.parametrize("seed", range(3))
+@sweep("seed", range(3), quick=[0])
 def test_touches_of_one_height_have_no_scale(seed):
     """A machine that was driven until it touched reads what it was driven to."""
     random = np.random.default_rng(seed)
@@ -171,7 +190,7 @@ def test_touches_of_one_height_have_no_scale(seed):
         found = pk.identify(ROBOT, m, "offset*")
     assert found.converged
     assert not any("scale of the instrument" in str(each) for each in found.verdict.said)
-    columns = {each.name: own for each, own in possible(found.fit)}
+    columns = {each.name: own for each, own in possible(found)}
     assert not any(some.any() for _, some in columns["the scale of the instrument"]())
 
 
@@ -210,10 +229,10 @@ def played_actuators(seed):
         (played_actuators, "play"),
     ],
 )
-def test_causes_are_named_where_poses_are_found_along(made, name):
-    for seed in range(3):
-        (first, *_) = found_causes(made(seed))
-        assert any(name in each for each in (first.name, *first.also))
+@sweep("seed", range(3), quick=[0])
+def test_causes_are_named_where_poses_are_found_along(made, name, seed):
+    (first, *_) = found_causes(made(seed))
+    assert any(name in each for each in (first.name, *first.also))
 
 
 @pytest.mark.parametrize("made", [cables, played_actuators])
@@ -230,5 +249,5 @@ def test_columns_of_mixtures_are_those_of_the_design(made):
 
 
 def test_of_sound_cables_hardly_any_cause_is_named():
-    named = sum(bool(found_causes(cables(seed))) for seed in range(50, 70))
-    assert named <= 3  # 5 of 100 are allowed: 4 or more of 20 in 1 of 60 trials
+    named = sum(bool(found_causes(cables(seed))) for seed in range(50, 58))
+    assert named <= 2  # 5 of 100 are allowed: 3 or more of 8 in 1 of 170 trials

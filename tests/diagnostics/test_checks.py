@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import pickle
+from collections.abc import Iterator
 from typing import Any, cast
 
 import numpy as np
@@ -43,7 +44,7 @@ def found(hexapod: pk.Robot) -> Identification:
     ([check("a"), check("a")], "a: two checks have this name"),
     ([check("a", "b")], "a: unless names no check: b"),
     ([check("a", levels=("doubt", "remark"))], "a: level_of must say which"),
-    ([check("a", levels=())], "a: level_of must say which"),
+    ([check("a", levels=())], "a: levels are of grave, doubt, remark; found none"),
     ([check("a", "b", at_once=True), check("b")], "a: made at once, it cannot wait for b"),
     ([check("a", "doubt", at_once=True), check("b")], "a: made at once, it cannot wait for b"),
     ([check("a", "b"), check("b", "c"), check("c", "a")], "wait for each other: a"),
@@ -191,12 +192,58 @@ def test_what_functions_of_a_check_return_wrongly_is_named(
         pk.diagnose(found, [Check(name="own", about="", **given)])
 
 
+def _fails(*given: Any) -> Any:
+    return found_nothing  # type: ignore[name-defined]  # noqa: F821
+
+
+def _fails_late(found: Any) -> Iterator[int]:
+    yield found.no_such_thing
+
+
+@pytest.mark.parametrize(
+    ("member", "function", "says"),
+    [
+        ("run", _fails, "own: run failed with NameError: .* it is given the calibration"),
+        ("run", _fails_late, "own: run failed with AttributeError"),
+        ("run", lambda: [1], "own: run failed with TypeError"),
+        ("say", _fails, "own: say failed with NameError: .* what run found: 1"),
+        ("level_of", _fails, "own: level_of failed with NameError"),
+        ("remedies", _fails, "own: remedies failed with NameError"),
+    ],
+)
+def test_a_function_of_a_check_that_fails_is_named(
+    found: Identification, member: str, function: Any, says: str
+) -> None:
+    whole = {"run": lambda found: [1], "say": lambda found, seen: "it"}
+    with pytest.raises(pk.ArgumentTypeError, match=says):
+        pk.diagnose(found, [Check(name="own", about="", **{**whole, member: function})])
+
+
 def test_one_level_or_one_name_may_stand_alone_and_a_check_has_a_name() -> None:
     assert check("a", levels=cast(Any, "remark")).levels == ("remark",)
+    assert check("a", levels=cast(Any, ["remark"])).levels == ("remark",)
+    for member in ("levels", "unless"):
+        with pytest.raises(pk.ArgumentTypeError, match=f"{member} of the check a must be a name"):
+            pk.Check(**{"name": "a", "about": "b", "run": len, "say": str, member: 3})
     one = Check(name="a", about="", run=len, say=str, unless=cast(Any, "grave"))  # type: ignore
     assert one.unless == ("grave",)
     with pytest.raises(pk.ArgumentError, match="name of a check must be a word, found None"):
         check(cast(Any, None))
+
+
+@pytest.mark.parametrize(
+    ("members", "says"),
+    [
+        ({"run": [1]}, "a: run must be a function, found "),
+        ({"say": None}, "a: say must be a function, found None"),
+        ({"level_of": "doubt"}, "a: level_of must be a function, found 'doubt'"),
+        ({"about": None}, "about of the check a must be a str"),
+    ],
+)
+def test_a_check_is_looked_at_when_it_is_made(members: dict[str, Any], says: str) -> None:
+    whole = {"about": "", "run": len, "say": str, **members}
+    with pytest.raises(pk.ArgumentTypeError, match=f"^{says}"):
+        Check(name="a", **whole)  # type: ignore[arg-type]
 
 
 def test_a_level_that_no_check_has_is_an_error(found: Identification) -> None:

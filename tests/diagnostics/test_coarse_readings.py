@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from pkmcal.statistics.steps import deviation
 
 from ..robots import linear_delta
 from ..simulated import hexapod_poses, with_errors
+from ..sweeps import sweep
 
 
 def said(found: pk.Identification) -> dict[str, str]:
@@ -31,8 +33,11 @@ def heights(robot: pk.Robot, count: int, rng: np.random.Generator) -> np.ndarray
     return robot.inverse(poses)
 
 
-@pytest.mark.parametrize("kind", ["pose", "position", "height", "distance", "orientation"])
-@pytest.mark.parametrize("written", [None, 4])
+@sweep(
+    "kind, written",
+    product(["pose", "position", "height", "distance", "orientation"], [None, 4]),
+    quick=[("pose", None), ("position", 4), ("height", None), ("orientation", 4)],
+)
 def test_commands_in_place_of_readings_are_no_calibration(kind: str, written: int | None) -> None:
     """Exact to the last digit, or as far as four decimals of the actuators allow."""
     robot = pk.load("hexapod")
@@ -56,7 +61,7 @@ def test_a_column_of_zeros_is_no_measurement() -> None:
     assert said(found)["nothing-measured"] == "grave"
 
 
-@pytest.mark.parametrize("size", [0.02, 0.05, 0.1])
+@sweep("size", [0.02, 0.05, 0.1], quick=[0.02])
 def test_a_machine_as_good_as_the_display_is_not_calibrated_by_it(size: float) -> None:
     """0.1 mm steps: whatever is drawn, numbers that are believed are as good as they say."""
     robot = delta()
@@ -98,14 +103,14 @@ def test_no_deviation_is_less_than_rounding_alone_gives(stated: float | None) ->
     np.testing.assert_array_less(0.0, found.accuracy(robot.home))
 
 
-@pytest.mark.parametrize(("cut", "sound"), [(np.round, True), (np.floor, False), (np.trunc, False)])
-@pytest.mark.parametrize(("name", "kind"), [
-    ("five-bar", "position"), ("rotary-delta", "position"), ("hexapod", "pose"),
-])  # fmt: skip
-def test_intervals_hold_whether_readings_were_rounded_or_cut(
-    name: str, kind: str, cut: np.ufunc, sound: bool
-) -> None:
+@sweep(
+    "name, cut",
+    product(["five-bar", "rotary-delta", "hexapod"], [np.round, np.floor, np.trunc]),
+    quick=[("five-bar", np.floor), ("rotary-delta", np.round)],
+)
+def test_intervals_hold_whether_readings_were_rounded_or_cut(name: str, cut: np.ufunc) -> None:
     """Positions shown in steps of ten times the noise: an offset of half a step in all rows."""
+    sound, kind = cut is np.round, "pose" if name == "hexapod" else "position"
     robot, step, inside, known, named = pk.load(name), 0.05, 0, 0, 0
     for seed in range(5):
         rng = np.random.default_rng(seed)
@@ -132,7 +137,7 @@ def test_intervals_hold_whether_readings_were_rounded_or_cut(
         assert named == (0 if sound else 5)
 
 
-@pytest.mark.parametrize("decimals", [2, 3, 6])
+@sweep("decimals", [2, 3, 6], quick=[2])
 def test_fine_steps_change_nothing(decimals: int) -> None:
     robot = pk.load("hexapod")
     rng = np.random.default_rng(5)
@@ -151,11 +156,10 @@ def test_fine_steps_change_nothing(decimals: int) -> None:
 def test_rounding_to_a_micrometre_is_sound_where_there_is_no_other_noise() -> None:
     robot = pk.load("hexapod")
     inside = []
-    for seed in range(6):
+    for seed in range(3):
         rng = np.random.default_rng(seed)
         q = robot.inverse(hexapod_poses(robot, 40, rng))
         true = with_errors(robot, 0.3, rng)
-        read = np.round(true.forward(q).pose[:, :3], 3)
         free = [f"base{i}.{c}" for i in range(1, 7) for c in "xyz"]
         true = robot.replace({name: true.geometry[name] for name in free})
         read = np.round(true.forward(q).pose[:, :3], 3)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from pkmcal.diagnostics.families import unlike_families
 from pkmcal.fitted.solution import Solution
 
 from ..simulated import with_errors
+from ..sweeps import sweep
 
 Spoil = Callable[[FloatArray, np.random.Generator], FloatArray]
 SIGMA = np.array([0.02, 0.02, 0.02, 5e-5, 5e-5, 5e-5])
@@ -98,7 +100,7 @@ def not_calibrated(found: Any) -> bool:
     return found is None or found.verdict.state != "calibrated"
 
 
-@pytest.mark.parametrize("mistake", MISTAKES)
+@sweep("mistake", MISTAKES, quick=["of other rows", "all reversed", "beta not filled"])
 def test_wrong_angles_are_not_calibrated_from(hexapod: pk.Robot, mistake: str) -> None:
     assert not_calibrated(judged(hexapod, MISTAKES[mistake], holdout=0.25))
 
@@ -113,7 +115,7 @@ def test_wrong_angles_are_not_calibrated_from_on_other_machines(name: str, mista
     assert not_calibrated(judged(machine, MISTAKES[mistake]))
 
 
-@pytest.mark.parametrize("name", ["hexapod", "2tpr2tps", "6-rus"])
+@sweep("name", ["hexapod", "2tpr2tps", "6-rus"], quick=["2tpr2tps"])
 def test_sound_angles_raise_no_suspicion(name: str) -> None:
     """Not even where their noise is a hundred times that of the lengths, as arcs."""
     for seed, spoil in ((0, None), (1, with_noise(300.0))):
@@ -149,14 +151,16 @@ def test_an_order_is_named_where_errors_of_the_machine_hide_it(hexapod: pk.Robot
     assert found.verdict.state == "doubtful"
 
 
-@pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize(("mistake", "words"), [
-    (None, ""), ("gamma reversed", "gamma counts the other way"), ("YZX", "(--rotation YZX)"),
-])  # fmt: skip
+@sweep(
+    "mistake, seed",
+    product([None, "gamma reversed", "YZX"], range(3)),
+    quick=[(None, 0), ("gamma reversed", 1), ("YZX", 0)],
+)
 def test_mistakes_that_numbers_of_the_machine_take_up_are_named(
-    mistake: str | None, words: str, seed: int
+    mistake: str | None, seed: int
 ) -> None:
     """A platform that turns about z by its errors alone, all numbers free."""
+    words = {"gamma reversed": "gamma counts the other way", "YZX": "(--rotation YZX)"}
     robot = pk.load("2tpr2tps-spatial")
     rng = np.random.default_rng(seed)
     true = with_errors(robot, 0.4, rng)
@@ -167,7 +171,8 @@ def test_mistakes_that_numbers_of_the_machine_take_up_are_named(
     good = np.isfinite(values).all(axis=1)
     verdict = pk.identify(robot, pk.Measurements(q[good], values[good], "pose")).verdict
     said = [each.text for each in verdict.said if each.check == "other-reading"]
-    assert len(said) == (mistake is not None) and all(words in text for text in said)
+    assert len(said) == (mistake is not None)
+    assert all(words[str(mistake)] in text for text in said)
     assert (verdict.state == "calibrated") == (mistake is None)
 
 

@@ -301,7 +301,8 @@ def test_a_lens_without_its_distortion_is_named_beside_a_fit_that_is_none(
 ) -> None:
     straight = with_lens(sound, k1=0.3, k2=0.0, p1=0.0, p2=0.0)
     assert "the lens is not that of these pictures" in doubts(straight)
-    found, _ = checks(straight)
+    few = straight.select(straight.group < 12)
+    found, _ = checks(replace(few, actuator_sigma=0.0))
     assert found.verdict.state != "calibrated"
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,8 @@ import pytest
 import pkmcal as pk
 from pkmcal.diagnostics.late import late
 
-from ..simulated import hexapod_poses, with_errors
+from ..simulated import hexapod_poses, said_by, with_errors
+from ..sweeps import sweep
 
 Read = Callable[[np.ndarray], np.ndarray]  # actuators to what is read there, of a true machine
 Simulated = tuple[Any, np.ndarray, Callable[[np.random.Generator], Read]]
@@ -52,7 +54,8 @@ def _poses(robot: pk.Robot, width: int) -> Read:
     return lambda at: robot.forward(at).pose[:, :width]
 
 
-MACHINES = pytest.mark.parametrize("machine", [hexapod, delta, arm])
+EVERY = [hexapod, delta, arm]
+MACHINES = sweep("machine", EVERY, quick=[delta])
 
 
 def noisy(exact: np.ndarray, rng: np.random.Generator) -> np.ndarray:
@@ -63,12 +66,13 @@ def measured(q: np.ndarray, read: np.ndarray, file: str = "") -> pk.Measurements
     return pk.Measurements(q, read, "pose" if read.shape[1] == 6 else "position", file=file)
 
 
+NEW = {"late-readings", "two-machines", "nothing-measured", "coarse-readings", "at-stop"}
+
+
 def doubts(robot: Any, *data: pk.Measurements, **options: Any) -> dict[str, Any]:
     found = pk.identify(robot, data, holdout=0.25, **options)
-    return {each.check: each for each in found.verdict.said if each.level == "doubt"}
-
-
-NEW = {"late-readings", "two-machines", "nothing-measured", "coarse-readings", "at-stop"}
+    said = said_by(found, *NEW, "copies", "near-copies")
+    return {name: each for name, each in said.items() if each.level == "doubt"}
 
 
 @MACHINES
@@ -79,9 +83,11 @@ def test_sound_rows_are_not_accused(machine: Callable[..., Simulated]) -> None:
         assert not NEW & doubts(robot, measured(q, noisy(true(rng)(q), rng))).keys()
 
 
-@MACHINES
-@pytest.mark.parametrize("leaving", [False, True])
-@pytest.mark.parametrize("share", [0.002, -0.002])
+@sweep(
+    "machine, leaving, share",
+    product(EVERY, [False, True], [0.002, -0.002]),
+    quick=[*product([delta], [False, True], [0.002, -0.002]), (arm, False, 0.002)],
+)
 def test_readings_off_where_the_machine_stops_are_named(
     machine: Callable[..., Simulated], leaving: bool, share: float
 ) -> None:
@@ -123,7 +129,7 @@ def test_rows_of_two_machines_are_told_apart(machine: Callable[..., Simulated], 
 
 
 @MACHINES
-@pytest.mark.parametrize("turn", ["random", "every third"])
+@sweep("turn", ["random", "every third"], quick=["random"])
 def test_rows_of_two_machines_in_no_order_that_is_known_are_told_apart(
     machine: Callable[..., Simulated], turn: str
 ) -> None:
@@ -134,9 +140,10 @@ def test_rows_of_two_machines_in_no_order_that_is_known_are_told_apart(
     assert "two-machines" in doubts(robot, measured(q, mixed))
 
 
-def test_two_files_of_two_machines_are_told_apart() -> None:
+@MACHINES
+def test_two_files_of_two_machines_are_told_apart(machine: Callable[..., Simulated]) -> None:
     rng = np.random.default_rng(3)
-    robot, q, true = hexapod(rng)
+    robot, q, true = machine(rng)
     halves = [
         measured(q[rows], noisy(true(rng)(q[rows]), rng), file)
         for rows, file in ((slice(0, 30), "one.csv"), (slice(30, 60), "other.csv"))
@@ -145,26 +152,26 @@ def test_two_files_of_two_machines_are_told_apart() -> None:
 
 
 @pytest.mark.filterwarnings("ignore:.*(further than errors|determined to no better)")
-def test_a_file_of_another_machine_is_not_taken_for_one_of_more_noise() -> None:
+@sweep("seed", range(4), quick=[0])
+def test_a_file_of_another_machine_is_not_taken_for_one_of_more_noise(seed: int) -> None:
     """One file is met to its noise, and all that the other is off was called its noise."""
-    rng = np.random.default_rng(13)
-    robot = pk.load("3rps")
-    found = []
-    for seed in range(4):
-        at = pk.sample_poses(robot, 45, seed=seed, share=0.5)
-        q, halves = robot.inverse(at, match=True), (slice(0, 22), slice(22, 45))
-        data = [
-            measured(q[rows], noisy(_poses(with_errors(robot, 0.2, rng), 6)(q[rows]), rng), f)
-            for rows, f in zip(halves, ("one.csv", "other.csv"), strict=True)
-        ]
-        found.append("two-machines" in doubts(robot, *data))
-    assert found == [True] * 4
+    rng, robot = np.random.default_rng(13 + seed), pk.load("3rps")
+    at = pk.sample_poses(robot, 45, seed=seed, share=0.5)
+    q, halves = robot.inverse(at, match=True), (slice(0, 22), slice(22, 45))
+    data = [
+        measured(q[rows], noisy(_poses(with_errors(robot, 0.2, rng), 6)(q[rows]), rng), f)
+        for rows, f in zip(halves, ("one.csv", "other.csv"), strict=True)
+    ]
+    assert "two-machines" in doubts(robot, *data)
 
 
-def test_files_of_unlike_noise_are_not_those_of_two_machines() -> None:
-    for seed in range(6):
+@MACHINES
+def test_files_of_unlike_noise_are_not_those_of_two_machines(
+    machine: Callable[..., Simulated],
+) -> None:
+    for seed in range(2):
         rng = np.random.default_rng(seed)
-        robot, q, true = [hexapod, delta, arm][seed % 3](rng)
+        robot, q, true = machine(rng)
         read = noisy(true(rng)(q), rng)
         read[:30] += 10.0 * (noisy(read[:30], rng) - read[:30])
         halves = [measured(q[:30], read[:30], "one.csv"), measured(q[30:], read[30:], "other.csv")]
@@ -210,7 +217,7 @@ def sides(q: np.ndarray, rng: np.random.Generator, lean: float) -> np.ndarray:
 
 
 @MACHINES
-@pytest.mark.parametrize("files", [False, True])
+@sweep("files", [False, True], quick=[True])
 def test_two_machines_that_were_measured_at_places_of_their_own_are_told_apart(
     machine: Callable[..., Simulated], files: bool
 ) -> None:
@@ -235,8 +242,7 @@ def test_rows_whose_places_differ_by_chance_are_not_elsewhere(
     q = q[: COUNT // 2] if q.shape[1] == 3 else q[: 2 * COUNT // 3]
     other = sides(q, rng, lean=1.0)
     mixed = noisy(np.where(other[:, None], true(rng)(q), true(rng)(q)), rng)
-    found = pk.identify(robot, measured(q, mixed))
-    (said,) = (each for each in found.verdict.said if each.check == "two-machines")
+    said = said_by(pk.identify(robot, measured(q, mixed)), "two-machines")["two-machines"]
     assert not said.finding.elsewhere and said.level == "doubt"
 
 
@@ -266,8 +272,7 @@ def turned(rng: np.random.Generator) -> Simulated:
 
 
 @pytest.mark.filterwarnings("ignore:.*determined to no better")
-@pytest.mark.parametrize("machine", [turned, arm])
-@pytest.mark.parametrize("deviation", [0.001, 0.5])
+@sweep("machine, deviation", product([turned, arm], [0.001, 0.5]), [(turned, 0.001), (arm, 0.5)])
 def test_touches_of_two_sockets_are_not_those_of_two_machines(
     machine: Callable[..., Simulated], deviation: float
 ) -> None:
@@ -280,8 +285,7 @@ def test_touches_of_two_sockets_are_not_those_of_two_machines(
     q = touching(read, q, at + 0.05 * rng.normal(size=at.shape))
     touch = pk.readings.Touch(np.where(second, "B", "A"), distances={("A", "B"): (50.0, deviation)})
     data = pk.Measurements(q, None, touch, target=TIP)
-    said = pk.identify(robot, data).verdict.said
-    assert not {"two-machines", "other-reading"} & {each.check for each in said}
+    assert not said_by(pk.identify(robot, data), "two-machines", "other-reading")
 
 
 @MACHINES
@@ -306,10 +310,10 @@ def test_poses_that_were_measured_twice_are_no_copies(machine: Callable[..., Sim
     robot, q, true = machine(rng)
     q = np.tile(q[: COUNT // 2], (2, 1)) + 1e-5 * np.ptp(q) * rng.normal(size=q.shape)
     found = pk.identify(robot, measured(q, noisy(true(rng)(q), rng)))
-    assert "near-copies" not in {each.check for each in found.verdict.said}
+    assert not said_by(found, "near-copies")
 
 
-@MACHINES
+@sweep("machine", EVERY, quick=[hexapod])
 @pytest.mark.parametrize("digits", [2, 4])
 def test_nominal_poses_that_were_rounded_are_no_measurements(
     machine: Callable[..., Simulated], digits: int
@@ -321,7 +325,7 @@ def test_nominal_poses_that_were_rounded_are_no_measurements(
     exact = there.pose if isinstance(robot, pk.Robot) else pk.screw.to_pose(there)
     read = np.round(exact[:, : 3 if machine is delta else 6], digits)
     found = pk.identify(robot, measured(q, read), holdout=0.25)
-    assert "nothing-measured" in {each.check for each in found.verdict.said}
+    assert said_by(found, "nothing-measured")
 
 
 def cables(rng: np.random.Generator, count: int = 40) -> tuple[Any, np.ndarray, Any]:
@@ -332,7 +336,7 @@ def cables(rng: np.random.Generator, count: int = 40) -> tuple[Any, np.ndarray, 
 
 
 @pytest.mark.filterwarnings("ignore:.*longer than the others allow")
-@pytest.mark.parametrize("wrong", ["nothing", "late", "two machines"])
+@sweep("wrong", ["nothing", "late", "two machines"], quick=["two machines"])
 def test_rows_are_tested_where_actuators_are_more_than_the_ways_to_move(wrong: str) -> None:
     rng = np.random.default_rng(15)
     robot, at, true = cables(rng)

@@ -14,6 +14,8 @@ from pkmcal.diagnostics.sides import sides
 from pkmcal.statistics.distributions import f_tail
 from pkmcal.statistics.group_test import group_test
 
+from ..sweeps import sweep
+
 ROBOT = pk.load("4ups-ps")
 FREE = ROBOT.model.free
 
@@ -39,18 +41,18 @@ def identified(seed: int, play: float, of: str = "limb2.platform.dz") -> Any:
         return pk.identify(ROBOT, pk.Measurements(q, read, "pose"), FREE)
 
 
-def test_a_joint_that_hangs_where_it_is_pushed_is_seen() -> None:
+@sweep("seed", range(3), quick=[0])
+def test_a_joint_that_hangs_where_it_is_pushed_is_seen(seed: int) -> None:
     """No cause that has a column looks like it."""
-    found = [identified(seed, 0.3) for seed in range(3)]
-    for each in found:
-        seen = sides(each)
-        assert seen is not None
-        assert seen.chance < RARE
-        assert seen.where == "that lean to the two sides about x"
-        assert each.verdict.state == "doubtful"
+    found = identified(seed, 0.3)
+    seen = sides(found)
+    assert seen is not None
+    assert seen.chance < RARE
+    assert seen.where == "that lean to the two sides about x"
+    assert found.verdict.state == "doubtful"
 
 
-@pytest.mark.parametrize("seed", range(6))
+@sweep("seed", range(6), quick=[0, 1])
 def test_a_sound_machine_has_no_sides(seed: int) -> None:
     seen = sides(identified(seed, 0.0))
     assert seen is None or seen.chance >= RARE

@@ -221,7 +221,7 @@ def test_a_coefficient_that_is_held_by_name_stays_where_it_starts(
     assert held.holdout_rms == pytest.approx(stated.holdout_rms, rel=1e-9)
     freed = pk.identify(robot, rows, free=["offset*", "sink.rate"], effects=[Sinking()])
     assert freed.free[-1] == "sink.rate"
-    with pytest.raises(pk.ArgumentError, match=r"fix: .*'sink.rte'"):
+    with pytest.raises(pk.ArgumentError, match=r"fix: .*'sink.rte'; did you mean 'sink.rate'"):
         pk.identify(robot, rows, free="offset*", effects=[Sinking()], fix="sink.rte")
 
 

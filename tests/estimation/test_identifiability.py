@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
+from pkmcal.calibration.asked import ROLES
 from pkmcal.calibration.identify import identify
+from pkmcal.estimation.datasets import as_fit_data
+from pkmcal.estimation.free_parameters import parameters
 from pkmcal.estimation.identifiability import (
     as_sum,
     decompose,
@@ -14,6 +17,7 @@ from pkmcal.estimation.identifiability import (
     observability,
     sparse_basis,
 )
+from pkmcal.estimation.parameters import Asked
 from pkmcal.measurements.virtual_machine import VirtualMachine
 
 from ..simulated import tilted_poses
@@ -145,7 +149,7 @@ def test_no_combination_is_named_twice() -> None:
     measured = pk.VirtualMachine(robot, 0.01).measure(q)
     found = pk.identify(robot, measured, unknown=["frame", "target"])
     open_ones = found.fit.estimate.state.measured.unidentifiable
-    basis = sparse_basis(open_ones, found.free)
+    basis = sparse_basis(open_ones, found.fit.parameters.families)
     basis /= np.linalg.norm(basis, axis=0)
     assert np.linalg.svd(basis)[1][-1] > 0.1 and basis.shape[1] == len(found.free) - found.rank
     np.testing.assert_allclose(open_ones @ (open_ones.T @ basis), basis, atol=1e-9)
@@ -159,11 +163,11 @@ def test_names_that_count_on_are_shortened() -> None:
 
 def test_sparse_basis_spans_the_same_combinations() -> None:
     rng = np.random.default_rng(10)
-    names = [
-        f"{point}{i}.{axis}" for point in ("base", "platform") for i in (1, 2) for axis in "xy"
+    families = [
+        f"{point}.{axis}" for point in ("base", "platform") for _ in (1, 2) for axis in "xy"
     ]
     open_ones, _ = np.linalg.qr(rng.normal(size=(8, 3)))
-    basis = sparse_basis(open_ones, names)
+    basis = sparse_basis(open_ones, families)
     assert basis.shape == (8, 3)
     np.testing.assert_allclose(open_ones @ (open_ones.T @ basis), basis, atol=1e-9)
     assert np.linalg.matrix_rank(basis) == 3
@@ -171,18 +175,31 @@ def test_sparse_basis_spans_the_same_combinations() -> None:
 
 def test_numbers_of_one_set_up_are_one_kind_however_many_they_are() -> None:
     """With an offset six touched places rise, or a base joint moves."""
-    names = ["offset1", "base1.x", *(f"touch.{place}.z" for place in "ABCDEF")]
+    families = ["offset", "base.x", *["touch"] * 6]
     risen, moved = [1.0, 0, *[1] * 6], [1.0, 1, *[0] * 6]
-    basis = sparse_basis(np.linalg.qr(np.column_stack([risen, moved])).Q, names)
+    basis = sparse_basis(np.linalg.qr(np.column_stack([risen, moved])).Q, families)
     assert sorted(map(tuple, np.abs(basis.T).round(9))) == sorted(map(tuple, [risen, moved]))
 
 
-def test_points_with_names_are_of_one_kind_as_numbered_ones_are() -> None:
-    rng = np.random.default_rng(3)
-    open_ones, _ = np.linalg.qr(rng.normal(size=(18, 5)))
-    machine = [f"{kind}1" for kind in ("offset", "rod", "gain", "base", "zero", "tilt")]
-    numbered, named = (
-        [*machine, *(f"target{target}.{axis}" for target in targets for axis in "xyz")]
-        for targets in ("1234", "ABCD")
-    )
-    np.testing.assert_array_equal(sparse_basis(open_ones, numbered), sparse_basis(open_ones, named))
+@pytest.mark.parametrize("names", [None, ("A", "B", "C")], ids=["numbered", "named"])
+@pytest.mark.parametrize("unknown", ["target", "attachment"])
+def test_points_are_of_one_kind_however_they_are_called(
+    unknown: str, names: tuple[str, ...] | None
+) -> None:
+    robot = pk.load("hexapod")
+    q = robot.inverse(pk.sample_poses(robot, 60, seed=1))
+    ends = np.array([[900.0, 0, 0], [-500.0, 800, 0], [-400.0, -800, 50]])
+    carried = pk.readings.Distance(np.eye(3) * 60.0)
+    measured = pk.Measurements(
+        q, np.full(60, 900.0), carried, target=ends, target_index=np.arange(60) % 3,
+        target_names=names,
+    )  # fmt: skip
+    said = {each: "unknown" if each == unknown else "known" for each in ROLES}
+    data = as_fit_data(robot, measured, said, False)
+    chosen = parameters(robot, data, Asked("base*"))
+    kinds = {
+        "target": ("anchor",) * 3,
+        "attachment": ("attachment.x", "attachment.y", "attachment.z"),
+    }
+    assert chosen.families[:6] == ("base.x", "base.y", "base.z") * 2
+    assert chosen.families[18:] == kinds[unknown] * 3

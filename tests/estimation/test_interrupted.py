@@ -18,6 +18,7 @@ from pkmcal.diagnostics.linearity import beyond_linear
 from pkmcal.estimation.estimator import Estimator
 from pkmcal.estimation.mirror import mirror_fits
 from pkmcal.estimation.mode_slips import in_other_modes, start_in_modes
+from pkmcal.estimation.solving import solve
 
 PLACES = 9  # at which each action is interrupted
 
@@ -83,9 +84,9 @@ ACTIONS: dict[str, Callable[[pk.Identification], object]] = {
         found.fit.estimate.evaluation,
         found.fit.estimate.state.noise,
     ),
-    "another fit": lambda found: Estimator(
-        found.fit.uncertainty.equations, found.fit.estimate.evaluation, "cauchy"
-    ).solve(),
+    "another fit": lambda found: solve(
+        Estimator.of(found.fit.uncertainty.equations, found.fit.estimate.evaluation, "cauchy")
+    ),
 }  # fmt: skip
 
 

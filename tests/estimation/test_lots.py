@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal.estimation import prediction, session_machines, whitening
+from pkmcal.estimation import derivatives, session_machines, whitening
 from pkmcal.statistics import clusters, linear_fit
 
 
@@ -32,7 +32,7 @@ def in_small_lots(monkeypatch: pytest.MonkeyPatch) -> None:
     for module, name, together in (
         (session_machines, "_TOGETHER", 7),
         (whitening, "_TOGETHER", 4),
-        (prediction, "_BATCH", 5),
+        (derivatives, "_BATCH", 5),
         (clusters, "_FEW", 7),
         (linear_fit, "_KEYS", 3),
     ):

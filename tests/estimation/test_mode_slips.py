@@ -121,3 +121,25 @@ def test_how_far_off_a_pose_is_counts_angles_as_their_arc(hexapod: pk.Robot) -> 
     off = worst_readings(fit.equations, residuals)[order]
     arc = 1e-3 * hexapod.length
     np.testing.assert_allclose(off, [arc, 5.0, 7.0, np.inf, 2.0, 0.0], atol=1e-6)
+
+
+def test_of_many_rows_in_another_mode_each_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whether all modes are found for each of them, or followed from a few."""
+    robot, _, readings = measured("hexapod", 0.5, 3)
+    data = FitData(readings, np.arange(len(readings)), False, False)
+    equations = Equations.of([data], parameters(robot, [data], Asked("offset*")))
+    start = equations.start()
+    wrong = np.arange(2, 20)
+    others = [robot.forward_all(equations.table.actuators[k]).poses for k in wrong]
+    far = [
+        poses[np.argmax(np.linalg.norm((poses - start.pose[k])[:, :3], axis=1))]
+        for k, poses in zip(wrong, others, strict=True)
+    ]
+    states = start.states.at_poses(wrong, np.array(far))
+    slipped = equations.at(start.theta, near=states)
+    missed = worst_readings(equations, slipped.residuals)
+    assert np.median(missed[wrong]) > 1.0  # mm: they are in other modes
+    for each in (1000, 4):
+        monkeypatch.setattr("pkmcal.estimation.mode_slips._EACH", each)
+        mended = in_their_modes(equations, slipped)
+        np.testing.assert_allclose(mended.pose, start.pose, atol=1e-6)

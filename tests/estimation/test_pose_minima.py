@@ -6,9 +6,10 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-import pytest
 
 import pkmcal as pk
+
+from ..sweeps import sweep
 
 NOISE = 0.2  # mm
 # kind, sides of the platform against those of the frame (x, y; upper cables at its top or bottom),
@@ -64,14 +65,15 @@ def in_false_minima(robot: pk.Robot, log: pk.Measurements, at: np.ndarray) -> in
     return int((~same).sum())
 
 
-@pytest.mark.parametrize(
-    ("name", "exact", "drop"),
+@sweep(
+    "name, exact, drop",
     [
         ("crossed", True, None),
         ("crossed", False, "slack"),
         ("crossed, upside down", True, "slack"),
         ("pulleys, upside down", False, None),
     ],
+    quick=[("crossed", True, None), ("crossed, upside down", True, "slack")],
 )
 def test_sound_cables_are_not_called_slack_where_forward_ends_in_false_minima(
     name: str, exact: bool, drop: Literal["slack"] | None, tmp_path: Path
@@ -89,11 +91,11 @@ def test_sound_cables_are_not_called_slack_where_forward_ends_in_false_minima(
     np.testing.assert_allclose(end, poses, atol=1e-2)
 
 
-@pytest.mark.parametrize(("name", "seed"), [("crossed", 2), ("pulleys, upside down", 2)])
+@sweep("name", ["crossed", "pulleys, upside down"], quick=["crossed"])
 def test_cables_that_are_slack_are_found_beside_rows_in_false_minima(
-    name: str, seed: int, tmp_path: Path
+    name: str, tmp_path: Path
 ) -> None:
-    _, true, log, _ = measured(name, seed, tmp_path)
+    _, true, log, _ = measured(name, 2, tmp_path)
     q, loose = log.actuators.copy(), [(3, 0), (30, 4), (31, 6), (50, 2), (60, 7)]
     for row, cable in loose:
         q[row, cable] += 40.0

@@ -7,11 +7,15 @@ import pytest
 
 import pkmcal as pk
 
+from ..sweeps import sweep
+
 pytestmark = pytest.mark.filterwarnings("ignore::pkmcal.CalibrationWarning")
 
 
-@pytest.mark.parametrize(
-    ("name", "share", "seed"), [("five-bar", 0.1, 0), ("3rps", 0.9, 14), ("3rps", 0.9, 3)]
+@sweep(
+    "name, share, seed",
+    [("five-bar", 0.1, 0), ("3rps", 0.9, 14), ("3rps", 0.9, 3)],
+    quick=[("3rps", 0.9, 14)],
 )
 def test_a_robust_loss_ends_where_the_linear_one_does(name: str, share: float, seed: int) -> None:
     """Few poses and much noise: the misfit falls towards a machine that its actuators let go."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
@@ -12,8 +14,9 @@ import pytest
 import pkmcal as pk
 from pkmcal.files.csv_table import Table
 from pkmcal.files.csv_writer import WrittenColumn, write_csv
-from pkmcal.measurements.field import Field, row_fields
+from pkmcal.measurements.field import Field, declared, read_back, row_fields
 from pkmcal.measurements.measurements import Measurements
+from pkmcal.measurements.session import Session
 from pkmcal.readings import Position
 
 from ..readings.own import Spot
@@ -90,6 +93,100 @@ def test_a_field_that_writes_columns_of_its_own_has_to_read_them() -> None:
 
     with pytest.raises(TypeError, match="Raw: has no method kept"):
         type("Raw", (Field,), {})
+
+
+@pytest.mark.parametrize("name", ["air_temp", "pos", "motor_1", "temp", "Sigma"])
+def test_a_field_whose_column_files_know_as_something_else_is_refused(name: str) -> None:
+    """It was written, and lost on reading."""
+    of = type("Own", (Field,), {"kept": lambda self, given, m: given})
+    own = of()
+    own.name = name
+    with pytest.raises(TypeError, match=f"Own: files have its column '{name}' as another name for"):
+        read_back((own,))
+    own.name = "pressure"
+    assert read_back((own,)) == (own,)
+
+
+@pytest.mark.parametrize(
+    ("returned", "found"),
+    [
+        (None, "NoneType"),
+        ([1.0] * ROWS, "list"),
+        (np.ones(ROWS - 1), r"shape \(4,\)"),
+        (np.float64(1.0), "float64"),
+    ],
+)
+def test_what_a_field_keeps_has_an_entry_for_each_row(returned: Any, found: str) -> None:
+    """Else what was given would be lost, or be another row's."""
+    own = type("Own", (Field,), {"kept": lambda self, given, m: returned})()
+    own.name = "pressure"
+    message = f"^pressure: kept of the class Own must return .* each of 5 rows; found {found}"
+    with pytest.raises(pk.ArgumentTypeError, match=message):
+        own.checked([1.0] * ROWS, range(ROWS))
+    assert own.checked(None, range(ROWS)) is None
+
+
+def own_field(**members: Any) -> Field:
+    made = type("Own", (Field,), {"kept": lambda self, given, m: np.array(given), **members})()
+    made.name = "pressure"
+    return made
+
+
+class Series:
+    """A column of a table, as pandas has it."""
+
+    def __init__(self, values: Any) -> None:
+        self.values = values
+
+    def __array__(self, dtype: Any = None, copy: Any = None) -> Any:
+        return self.values
+
+
+@pytest.mark.parametrize("of", [np.asarray, Series])
+def test_what_a_field_keeps_is_not_the_callers_array(of: Any) -> None:
+    own, values = own_field(kept=lambda self, given, m: np.asarray(given)), np.ones(ROWS)
+    kept = own.checked(of(values), range(ROWS))
+    values[:] = 7.0
+    assert (kept == 1.0).all()
+
+
+def fails(*given: Any) -> Any:
+    return {}["gone"]
+
+
+@pytest.mark.parametrize("method", ["kept", "columns", "read", "said", "printed", "names"])
+def test_what_fails_in_a_field_is_named_with_its_class(method: str) -> None:
+    own = own_field(**{"columns": Field.columns, "read": fails, method: fails})
+    needs = len(inspect.signature(getattr(Field, method)).parameters) - 1
+    with pytest.raises(pk.ArgumentTypeError, match=f"^{method} of the class Own failed with KeyE"):
+        getattr(own, method)(*[None] * needs)
+
+
+@pytest.mark.parametrize("method", ["columns", "said", "printed", "names"])
+def test_what_a_field_returns_is_of_the_class_that_is_declared(method: str) -> None:
+    own = own_field(**{"read": fails, method: lambda *given: None})
+    needs = len(inspect.signature(getattr(Field, method)).parameters) - 1
+    with pytest.raises(pk.ArgumentTypeError, match=f"^{method} of the class Own must return "):
+        getattr(own, method)(*[None] * needs)
+
+
+def test_columns_that_a_field_would_not_be_read_back_from_are_not_written() -> None:
+    def columns(self: Any, m: Any, units: Any) -> Iterator[WrittenColumn]:
+        yield WrittenColumn("air", "", np.ones(ROWS))
+
+    m = spots(Camera())
+    with pytest.raises(
+        pk.ArgumentTypeError, match="columns of the class Own writes 'air': the class needs"
+    ):
+        own_field(columns=columns, read=fails).written(m, ("mm",) * 6)
+    own = own_field(columns=columns, read=fails, names=lambda self, a, c: {"air"})
+    assert [column.name for column in own.written(m, ("mm",) * 6)] == ["air"]
+
+
+def test_a_field_is_declared_by_its_module_and_class() -> None:
+    assert isinstance(declared("session:Session"), Session)
+    with pytest.raises(AttributeError):
+        declared("session:Sitting")
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import pickle
 from types import SimpleNamespace
@@ -15,7 +16,7 @@ from hypothesis import strategies as st
 from pkmcal.exceptions import ArgumentError
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.virtual_machine import VirtualMachine
-from pkmcal.readings import Distance, Height
+from pkmcal.readings import Distance, Height, Touch
 
 from .kinds import PUBLIC, needed, shape, width
 
@@ -51,6 +52,13 @@ def test_sigma_of_any_stated_shape_is_one_per_component_and_row(shape: tuple[int
     given_sigma = 0.01 * (1 + np.arange(np.prod(shape, dtype=int))).reshape(shape)
     sigma = make(sigma=given_sigma).sigma
     np.testing.assert_array_equal(sigma, np.broadcast_to(given_sigma, (5, 3)))
+
+
+def test_names_of_an_instrument_stay_read_only_in_a_pickle() -> None:
+    m = Measurements(np.zeros((2, 6)), None, Touch(np.array(["A", "B"])))
+    for again in (m, pickle.loads(pickle.dumps(m)), copy.deepcopy(m)):
+        with pytest.raises(ValueError, match="read-only"):
+            again.instrument.touched[0] = "B"
 
 
 @pytest.mark.parametrize("kind", PUBLIC)

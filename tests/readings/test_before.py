@@ -20,6 +20,7 @@ from pkmcal.readings import Distance, Touch
 from ..simulated import with_errors
 from .cases import CASES, NOISE, TIP, Case
 
+FRAME = ("x", "y", "z", "alpha", "beta", "gamma")
 WRONG = np.array([25.0, -15.0, -40.0])  # mm, that points are stated beside where they are
 
 # What can be unknown, where that is more than the cases of a kind have
@@ -61,6 +62,48 @@ def test_a_machine_as_it_was_designed_is_off_by_the_noise(case: Case) -> None:
     found = pk.identify(robot, measured, free, prior=1e-6, unknown=unknown)
     assert found.rms_before < 1.03 * found.rms
     assert found.rms < 1.1 * NOISE * np.sqrt(len(measured.components))
+    # "before", the first of the history and the values at the start are of one state
+    if not found.fit.uncertainty.mixed:  # else of poses that are fitted as well
+        assert found.history[0] == pytest.approx(found.rms_before, rel=1e-12)
+    values = found.fit.parameters.reported(found.fit.start.theta)
+    np.testing.assert_array_equal(found.start, values[found.columns])
+
+
+@pytest.mark.parametrize("case", [c for c in READ if "pixel" in c.name], ids=lambda case: case.name)
+def test_of_a_machine_as_it_was_designed_the_lens_is_not_doubted(case: Case) -> None:
+    """Another lens that fits worse was named where corners are far less off than 0.3 px."""
+    robot = pk.load(case.machine)
+    for seed in range(2):
+        measured = case.measured(robot, case.rows, seed, NOISE)
+        found = pk.identify(robot, measured, "offset*", unknown=case.unknown)
+        said = [each.check for each in found.verdict.said if each.level != "remark"]
+        assert "doubtful-readings" not in said
+
+
+@pytest.mark.filterwarnings("ignore")  # of a machine that is held
+@pytest.mark.parametrize("noise", [0.02, None])
+def test_closures_before_are_those_of_the_frame_that_the_table_says(noise: float | None) -> None:
+    """Held at the values of the column "start", a fit leaves what is called before."""
+    robot, rng = pk.load("hexapod"), np.random.default_rng(0)
+    names = robot.geometry.match(["base*", "offset*"])
+    true = robot.replace({n: robot.geometry[n] + 0.3 * rng.normal() for n in names})
+    q = robot.inverse(pk.sample_poses(robot, 30, seed=1, share=0.5))
+    base = pk.screw.from_pose(np.array([[100.0, 200, 50, 0.3, 0.1, -0.4]]))
+    read = pk.screw.to_pose(base @ pk.screw.from_pose(true.forward(q).pose))
+    read += rng.normal(size=read.shape) * [*[0.02] * 3, *[5e-5] * 3]
+    sigma = [*[0.02] * 3, *[5e-5] * 3]
+    m = pk.Measurements(q, read, "pose", sigma=sigma, actuator_sigma=noise)
+    found = pk.identify(robot, m, names, unknown="frame")
+    assert found.free[-6:] == tuple(f"frame.{each}" for each in FRAME)
+    frame = pk.screw.from_pose(found.start[None, -6:])
+    there = pk.screw.to_pose(np.linalg.inv(frame) @ pk.screw.from_pose(read))
+    held = pk.Measurements(q, there, "pose", sigma=sigma, actuator_sigma=noise)
+    alone = pk.identify(robot, held, "offset1", prior=1e-9)
+    assert found.rms_before == pytest.approx(alone.rms_before, rel=1e-3)
+    if noise is None:
+        assert found.history[0] == pytest.approx(found.rms_before, rel=1e-12)
+    else:
+        assert found.closure_rms_before == pytest.approx(alone.closure_rms_before, rel=1e-3)
 
 
 @pytest.mark.filterwarnings("ignore")  # errors that no free number explains

@@ -14,6 +14,7 @@ import pkmcal as pk
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.free_parameters import parameters
+from pkmcal.estimation.own_classes import require_true
 from pkmcal.estimation.parameters import Asked
 from pkmcal.estimation.starts import with_starts
 from pkmcal.readings import At, Height, Position, Predicted, Reading, Start, always
@@ -52,6 +53,7 @@ def test_derivatives_are_those_of_differences(case: Case, unknown: bool) -> None
     if share.frame is not None:
         frame = chosen.nuisance[share.frame]
         theta[frame : frame + 6] = case.frame
+    require_true(equations.prediction, equations.at(theta), trusted=lambda of: False)
     (jacobian,) = equations.jacobian(equations.at(theta))
     columns = []
     for j, scale in enumerate(chosen.scale):
@@ -151,6 +153,30 @@ def test_values_that_are_grossly_off_in_a_unit_of_ones_own_are_judged() -> None:
     with pytest.warns(pk.CalibrationWarning):
         found = pk.identify(robot, wrong, free="offset*", prior=SIGMA)
     assert found.verdict.state == "not calibrated"
+
+
+@pytest.mark.parametrize("stated", [True, False], ids=["sigma", "no sigma"])
+def test_a_worth_in_mm_of_each_row_is_that_of_all_rows_where_they_are_alike(
+    stated: bool,
+) -> None:
+    """Statistics and words are the same to the last digits."""
+
+    @dataclasses.dataclass(frozen=True, eq=False)
+    class ByRow(Spot):
+        def mm(self, m: Any, length: float) -> np.ndarray:
+            return np.full((len(m), 2), self.pitch)
+
+    robot = pk.load("hexapod")
+    q = robot.inverse(pk.sample_poses(robot, 30, seed=1))
+    true = robot.replace({"offset1": 0.4})
+    measured = pk.VirtualMachine(true, noise=0.2, seed=0).measure(q, Spot(), [30.0, 0, 50])
+    rows = measured if stated else dataclasses.replace(measured, sigma=None)
+    one = pk.identify(robot, rows, "offset*")
+    two = pk.identify(robot, dataclasses.replace(rows, kind=ByRow()), "offset*")
+    np.testing.assert_allclose(two.values, one.values, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(two.stderr, one.stderr, rtol=1e-9)
+    assert two.observability == pytest.approx(one.observability, rel=1e-9)
+    assert str(two) == str(one)
 
 
 def test_a_unit_of_which_nobody_says_what_it_is_worth_is_refused_by_name() -> None:
@@ -255,10 +281,13 @@ class String(Loop):
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ("predict", r"predict of 'string' must return Predicted\(…\); found tuple"),
+        ("predict", r"predict of the class String must return Predicted; found tuple"),
         ("names", "zero: the dependence on it has 1 names .* each of 20 rows"),
-        ("depend", "String: dependences has to yield objects of Dependence, .* found str"),
-        ("none", "String: dependences has to yield objects of Dependence, .* found NoneType"),
+        (
+            "depend",
+            r"dependences of the class String must return Iterator\[Dependence\]; found str",
+        ),
+        ("none", r"dependences of the class String must return Iterator\[Dependence\]; found None"),
         ("nan", "the search for loop.A.zero has a start that is no finite number"),
         ("size", r"Start: 2 slots \(0, 1\) need as many values; found shape \(1,\)"),
         ("slots", r"zero: the start of loop 'A' has slots \(3,\), and the argument 1 numbers"),
@@ -280,7 +309,9 @@ def test_starts_that_need_poses_and_do_not_say_so_are_named() -> None:
     robot = pk.load("hexapod")
     q = robot.inverse(pk.sample_poses(robot, 20, seed=1))
     measured = pk.VirtualMachine(robot, NOISE).measure(q, Forgot(["A"] * 20))
-    with pytest.raises(pk.ArgumentError, match=r"starts of 'string' .* starts_by_pose = True"):
+    with pytest.raises(
+        pk.ArgumentError, match=r"starts of the class Forgot .* starts_by_pose = True"
+    ):
         pk.identify(robot, measured, "offset*")
 
 
@@ -333,8 +364,8 @@ def _failing(at: At, zero: Any, failure: str) -> Predicted:
 @pytest.mark.parametrize(
     "failure, said",
     [
-        ("no by_twist", r"TypeError: .* 'by_twist'; it is given at.* has to return Predicted\("),
-        ("a key", r"KeyError: 'zerro'; it is given at, zero \(what its methods arguments"),
+        ("no by_twist", r"TypeError: .* 'by_twist'; it is given at.* has to return Predicted"),
+        ("a key", r"KeyError: 'zerro'; it is given at, zero and has to return Predicted"),
     ],
 )
 def test_a_predict_that_fails_is_named_with_what_it_is_given(failure: str, said: str) -> None:

@@ -79,5 +79,5 @@ def test_one_that_says_nothing_begins_at_the_base(hexapod: pk.Robot) -> None:
     seen += np.random.default_rng(3).normal(0, 0.01 * SCALE, seen.shape)
     measured = pk.Measurements(q, seen, Inches(), sigma=0.01 * SCALE)
     found = pk.identify(hexapod, measured, "offset1", unknown="frame")
-    np.testing.assert_array_equal(found.start[-6:], 0.0)
+    np.testing.assert_array_equal(found.fit.aligned.theta[-6:], 0.0)
     assert found.converged and found.rms < 0.03

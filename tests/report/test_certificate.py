@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
+from pkmcal.core.library import POSE
 from pkmcal.report import certificate, pdf, report
 
 from .. import browser, workspaces
@@ -147,13 +148,32 @@ def test_u_is_stated_over_the_measured_region_first(folder: Path, found: pk.Iden
     page = (folder / "report.html").read_text("utf-8")
     assert 0 < page.index('id="measured"') < page.index('id="expanded"')
     told = json.loads((folder / "report.json").read_text("utf-8"))["certificate"]
-    places = found.fit.end.pose[:, :3]
-    for axis, (low, high) in told["measured"]["extent"].items():
-        own = places[:, "xyz".index(axis)]
-        assert (low, high) == pytest.approx((own.min(), own.max()))
+    for name, own in zip(POSE, found.fit.end.pose.T, strict=True):  # angles are below half a turn
+        assert told["measured"]["extent"][name] == pytest.approx([own.min(), own.max()], abs=1e-12)
     assert told["measured"]["expanded_uncertainty"] < told["expanded_uncertainty"]
-    assert told["region"] and set(told["extent"]) == {"x", "y", "z"}
+    assert told["region"] and set(told["extent"]) == set(POSE)
+    turns = np.degrees(told["measured"]["extent"]["gamma"])
+    assert f"gamma {turns[0]:.1f} to {turns[1]:.1f} deg" in page
     assert "counter(page)" in page and f"pkmcal {pk.__version__}" in page
+
+
+@pytest.mark.parametrize(
+    ("degrees", "ends"),
+    [
+        ([170, -175, 178, 181], [170, 185]),  # a tool that points down
+        ([-3, 2, 0, 1], [-3, 2]),
+        ([180, 180], [180, 180]),
+        ([0, 120, -120], [-120, 120]),
+        ([40], [40, 40]),
+    ],
+)
+def test_the_range_of_an_angle_is_the_shortest_arc(degrees: list[float], ends: list[float]) -> None:
+    poses = np.zeros((len(degrees), 6))
+    poses[:, 3] = np.radians(degrees)
+    low, high = np.degrees(certificate._extent(poses)["alpha"])
+    assert high - low == pytest.approx(ends[1] - ends[0], abs=1e-9)
+    inside = (np.array(degrees) - low + 1e-6) % 360 <= high - low + 2e-6
+    assert inside.all() and abs(low + high) / 2 <= 180 + 1e-9
 
 
 def test_without_repeats_their_scatter_and_lack_of_fit_are_one_line() -> None:

@@ -87,7 +87,7 @@ def test_where_no_stroke_ends_the_workspace_it_is_what_was_measured() -> None:
     sampled, area = over_the_workspace(found, drawn)
     assert area is not None and "between those that were measured" in sampled.where
     margin = 2.0  # mm: poses are where the noise says
-    for seen in (sampled.positions[:, :2], np.transpose([ends[[0, -1]] for ends in area.values])):
+    for seen in (sampled.tools[:, :2], np.transpose([ends[[0, -1]] for ends in area.values])):
         assert (seen > low - margin).all() and (seen < high + margin).all()
     drives = pk.load("hexapod")
     q = drives.inverse(hexapod_poses(drives, 20, np.random.default_rng(0)))

@@ -62,7 +62,7 @@ def _design(found: pk.Identification) -> Design:
     fit = found.fit.uncertainty.fit
     size = np.sqrt(len(fit.residual) / fit.design.shape[1])
     even = replace(fit, back=fit.back * size)
-    return Design(even, np.isfinite(found.stderr), found.fit.uncertainty.labels.row)
+    return Design(even, np.isfinite(found.stderr), found.fit.uncertainty.blocks.row)
 
 
 @cache
@@ -88,7 +88,7 @@ def hexapod(
 
 def errors(design: Design, shared: float, rng: np.random.Generator) -> FloatArray:
     """Unit errors (M,) of readings, and errors that equations of a pose and component share."""
-    key = design.fit.key
+    key = design.fit.key()
     own = rng.normal(size=len(key))
     return own + shared * rng.normal(size=int(key.max()) + 1)[key]
 

@@ -7,11 +7,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy import stats
 
-from pkmcal.exceptions import ArgumentError
-from pkmcal.statistics.budget import Budget, Contribution, coverage_factor, pooled, standard
+from pkmcal.statistics.budget import Budget, Contribution, standard
 
 DRAWS = 400_000
+
+
+def factor(probability: float, dof: float) -> float:
+    """Coverage factor by Student's t, as SciPy has it."""
+    return float(stats.t.ppf(0.5 + probability / 2.0, dof))
 
 
 def test_the_end_gauge_of_the_gum() -> None:
@@ -23,7 +28,7 @@ def test_the_end_gauge_of_the_gum() -> None:
         Contribution("difference of expansion", 0.58e-6, length * 0.1, dof=50, type="B"),
         Contribution("difference of temperature", 0.029, length * expansion, dof=2, type="B"),
     )
-    budget = Budget(lines, coverage_factor(0.99, 16))
+    budget = Budget(lines, factor(0.99, 16))
     assert [round(line.share, 1) for line in lines] == [25.0, 9.7, 2.9, 16.7]
     assert round(budget.combined) == 32
     assert int(budget.dof) == 16
@@ -34,7 +39,7 @@ def test_the_end_gauge_of_the_gum() -> None:
 def test_four_normal_inputs_of_supplement_1() -> None:
     """JCGM 101, 9.2.2: u = 2.0, the 95 % interval is ±3.92."""
     lines = tuple(Contribution(f"X{i}", 1.0) for i in range(4))
-    budget = Budget(lines, coverage_factor(0.95, np.inf))
+    budget = Budget(lines, factor(0.95, np.inf))
     assert budget.combined == 2.0 and round(budget.expanded, 2) == 3.92
     assert budget.dof == np.inf and budget.coverage == pytest.approx(0.95)
     drawn = np.random.default_rng(0).normal(size=(4, DRAWS)).sum(axis=0)
@@ -46,7 +51,7 @@ def test_four_rectangular_inputs_of_supplement_1() -> None:
     """JCGM 101, 9.2.3: u = 2.0; by the GUM ±3.92, by drawing ±3.88."""
     half = np.sqrt(3.0)  # of unit variance
     lines = tuple(Contribution(f"X{i}", standard(half, "rectangular"), type="B") for i in range(4))
-    budget = Budget(lines, coverage_factor(0.95, np.inf))
+    budget = Budget(lines, factor(0.95, np.inf))
     assert budget.combined == pytest.approx(2.0) and round(budget.expanded, 2) == 3.92
     drawn = np.random.default_rng(1).uniform(-half, half, (4, DRAWS)).sum(axis=0)
     assert np.quantile(np.abs(drawn), 0.95) == pytest.approx(3.88, abs=0.01)
@@ -58,7 +63,7 @@ def test_one_dominant_rectangular_input_of_supplement_1() -> None:
         *(Contribution(f"X{i}", standard(np.sqrt(3.0), "rectangular")) for i in range(3)),
         Contribution("X4", standard(10.0 * np.sqrt(3.0), "rectangular")),
     )
-    budget = Budget(lines, coverage_factor(0.95, np.inf))
+    budget = Budget(lines, factor(0.95, np.inf))
     assert round(budget.combined, 1) == 10.1 and round(budget.expanded, 1) == 19.9
     rng = np.random.default_rng(2)
     widths = np.array([1.0, 1.0, 1.0, 10.0])[:, None] * np.sqrt(3.0)
@@ -91,10 +96,3 @@ def test_the_coverage_that_is_stated_comes_true(few: int) -> None:
     ])  # fmt: skip
     stated = np.mean([budget.coverage for budget in budgets])
     assert held == pytest.approx(stated, abs=4 * np.sqrt(0.1 / 2000))
-
-
-def test_pooled_variances_and_refusals() -> None:
-    assert pooled([4.0, 1.0], [10.0, 20.0]) == (2.0, 30.0)
-    assert np.isnan(pooled([], [])[0])
-    with pytest.raises(ArgumentError, match="probability"):
-        coverage_factor(1.0, 3)

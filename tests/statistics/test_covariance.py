@@ -30,8 +30,8 @@ def by_rule(design: Design, rule: str = "auto") -> Covered:
 def exact(design: Design, shared: float) -> FloatArray:
     """Deviations of the least-squares parameters, from the covariance of the errors itself."""
     fit = design.fit
-    same = (fit.key[:, None] == fit.key).astype(float)
-    middle = fit.design.T @ (np.eye(len(fit.key)) + shared**2 * same) @ fit.design
+    same = (fit.key()[:, None] == fit.key()).astype(float)
+    middle = fit.design.T @ (np.eye(len(fit.key())) + shared**2 * same) @ fit.design
     return np.sqrt(np.diagonal(design.contrasts @ middle @ design.contrasts.T))
 
 

@@ -37,9 +37,9 @@ def drawn(design: Design, shared: float, tails: bool, rng: np.random.Generator) 
     """Errors (M,) of unit deviation, normal or with the tails of Student's t of 4."""
     if not tails:
         return errors(design, shared, rng)
-    of_key = rng.standard_t(4, size=int(design.fit.key.max()) + 1) / np.sqrt(2.0)
-    own = rng.standard_t(4, size=len(design.fit.key)) / np.sqrt(2.0)
-    total: FloatArray = own + shared * of_key[design.fit.key]
+    of_key = rng.standard_t(4, size=int(design.fit.key().max()) + 1) / np.sqrt(2.0)
+    own = rng.standard_t(4, size=len(design.fit.key())) / np.sqrt(2.0)
+    total: FloatArray = own + shared * of_key[design.fit.key()]
     return total
 
 
@@ -51,7 +51,7 @@ def compared(
     mine = design.fit.cluster < fitted
     fit, _ = part.fitted(y[mine])
     sandwich = Sandwich(fit)
-    of_noise = noise(sandwich.residual, sandwich.retained, fit.key)
+    of_noise = noise(sandwich.residual, sandwich.retained, fit.key())
     unit = np.sqrt(of_noise[0])
     left = factor * (y[rest] - outside @ (fit.design.T @ y[mine]))
     test = holdout_test(
@@ -60,7 +60,7 @@ def compared(
             left / unit, outside / unit, numbered(design.row[rest]),
             numbered(design.fit.cluster[rest]), design.fit.component[rest],
         ),
-        noise(sandwich.residual / unit, sandwich.retained, fit.key),
+        noise(sandwich.residual / unit, sandwich.retained, fit.key()),
         sandwich.data,
     )  # fmt: skip
     expected = of_noise[0] + np.einsum("ij,jk,ik->", outside, sandwich.data, outside) / len(rest)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pkmcal.arrays import FloatArray
-from pkmcal.estimation.loss import Loss, LossName
+from pkmcal.estimation.loss import LossName, decline, limits, weights
 from pkmcal.statistics.covariance import covariance
 from pkmcal.statistics.distributions import t_factor
 from pkmcal.statistics.linear_fit import LinearFit
@@ -31,8 +31,8 @@ def robust_fit(design: Design, y: FloatArray, name: LossName) -> tuple[LinearFit
             r = y - fit.design @ b
             squares = np.add.reduceat(r**2, first)
             scale = np.sqrt(median_ratio(squares, components) * m / (m - p))
-            loss = Loss(name, components, np.full(len(components), scale))
-            w = np.repeat(loss.weights(r), components)
+            of_rows = components, limits(name, components, np.full(len(components), scale))
+            w = np.repeat(weights(name, r, *of_rows), components)
             new = np.linalg.solve(fit.design.T @ (w[:, None] * fit.design), fit.design.T @ (w * y))
             done = np.abs(new - b).max() < 1e-10 * scale
             b = new
@@ -40,7 +40,8 @@ def robust_fit(design: Design, y: FloatArray, name: LossName) -> tuple[LinearFit
                 break
     r = y - fit.design @ b
     if name != "linear":
-        r = pseudo_residuals(r, components, loss.weights(r), loss.decline(r), p)[0]
+        both = weights(name, r, *of_rows), decline(name, r, *of_rows)
+        r = pseudo_residuals(r, components, *both, p)[0]
     return replace(fit, residual=r), design.contrasts @ b
 
 
@@ -91,7 +92,7 @@ def chances(name: LossName, shared: float, share: float, runs: int) -> FloatArra
     rng, found = np.random.default_rng(0), []
     for _ in range(runs):
         fit, _ = robust_fit(design, with_gross(design, shared, share, rng), name)
-        found.append(split(fit.residual, fit.key, float(fit.leverage.sum())).chance)
+        found.append(split(fit.residual, fit.key(), float(fit.leverage().sum())).chance)
     return np.array(found)
 
 

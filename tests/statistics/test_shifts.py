@@ -21,7 +21,7 @@ def sessions(
     fit = design.fit
     jacobian = fit.design * np.sqrt(len(fit.residual) / fit.design.shape[1])
     half = fit.cluster < fit.clusters // 2
-    of_pose = shared * rng.normal(size=int(fit.key.max()) + 1)[fit.key]
+    of_pose = shared * rng.normal(size=int(fit.key().max()) + 1)[fit.key()]
     y = rng.normal(size=len(half)) + of_pose
     y[~half] += jacobian[~half] @ shift
     first = np.linalg.lstsq(jacobian[half], y[half], rcond=None)[0]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -10,6 +12,8 @@ from hypothesis import strategies as st
 from pkmcal.statistics.extremes import tied_extremes
 from pkmcal.statistics.group_test import few_equations, group_test
 from pkmcal.statistics.steps import deviation, step_of
+
+from ..sweeps import sweep
 
 seeds = st.integers(0, 10_000)
 
@@ -135,8 +139,11 @@ def test_a_group_of_another_machine_is_told_whatever_its_weights() -> None:
     assert tested.apart < 0.1 < plain.apart
 
 
-@pytest.mark.parametrize("sizes", [(14, 14), (14, 60), (60, 14)])
-@pytest.mark.parametrize("louder", [1.0, 10.0])
+@sweep(
+    "sizes, louder",
+    product([(14, 14), (14, 60), (60, 14)], [1.0, 10.0]),
+    quick=[((14, 60), 10.0), ((60, 14), 10.0)],
+)
 def test_groups_of_unlike_noise_are_called_unlike_as_seldom(
     sizes: tuple[int, int], louder: float
 ) -> None:

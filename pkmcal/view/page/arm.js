@@ -1,4 +1,4 @@
-// A serial arm: its joints, and where they take the tool.
+// A serial arm: its joints, and where they take the tool. Joints that follow others move by `shares` of the actuators.
 class Arm {
   constructor(core, data) {
     Object.assign(this, { core, data, n: data.actuators.length, mode: 0, stopped: '' })
@@ -11,20 +11,22 @@ class Arm {
     this.q = q
     this.pose = this.forward(q)
     this.tool = Array.from(this.core.tool.subarray(0, 16))
-    this.frames = rowsOf(this.core.frames, this.n + 1, 12)
+    this.frames = rowsOf(this.core.frames, this.data.joints.length + 1, 12)
     this.own = this.pose
     this.stopped = stopped
   }
 
   forward(q) {
-    this.core.q.set(q)
+    const { shares } = this.data
+    this.core.q.set(shares ? shares.map(row => dot(row, q)) : q)
     this.core.wasm.forward()
     return Array.from(this.core.pose.subarray(0, 6))
   }
 
   // the tool's twist by the joints: rotation as its arc, then velocity, both in base axes
   jacobian() {
-    const { length, moved } = this.data, rows = rowsOf(this.core.jacobian, 6, this.n)
+    const { length, moved, joints, shares } = this.data, byJoints = rowsOf(this.core.jacobian, 6, joints.length)
+    const rows = shares ? byJoints.map(row => columnsOf(shares).map(own => dot(row, own))) : byJoints
     const turns = rows.slice(0, 3).map(row => scaled(row, length))
     return moved.length === 6 ? [...turns, ...rows.slice(3)] : rows.slice(3)
   }

@@ -83,8 +83,8 @@ class Panel {
     made('h3', side, { text: arm ? (slides ? 'Move the joints' : 'Turn the joints') : surplus ? 'Actuators' : 'Move the actuators' })
     const what = arm ? 'The tool follows' : surplus ? 'There are more of them than ways to move: none moves alone, all follow' : 'The platform follows'
     made('p', side, { className: 'hint', text: `${what}${stated ? `; shaded: ${arm ? 'within its limits' : 'the stroke'}` : ''}.` })
-    this.q = actuators.map(({ unit, reading, range, stroke }, a) => slider(side, {
-      name: `q${a + 1}`, title: joints?.[a].name ?? `actuator ${a + 1}`, unit: reading ?? unit, range, allowed: stroke, disabled: surplus,
+    this.q = actuators.map(({ name, unit, reading, range, stroke }, a) => slider(side, {
+      name: `q${a + 1}`, title: name ?? `actuator ${a + 1}`, unit: reading ?? unit, range, allowed: stroke, disabled: surplus,
       moved: value => { this.mover.moveActuator(a, value); this.changed() },
     }))
   }

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from pkmcal.arrays import FloatArray
-from pkmcal.estimation.elimination import Elimination
+from pkmcal.core.elimination import PoseEquations
+from pkmcal.estimation.pose_search import best
 from pkmcal.estimation.row_states import RowStates
 
 ANCHORS = np.array([[0.0, 2000], [3000, 2000], [0, 0], [3000, 0]])
@@ -38,8 +39,8 @@ def test_poses_of_gross_readings_are_at_a_minimum() -> None:
     pose = np.zeros((count, 6))
     pose[:, :2] = at
     start = RowStates(pose, read, np.zeros(count, dtype=np.int32))
-    blocks = Elimination(np.repeat(np.arange(count), 4), count, 2, 3000.0)
-    found, _ = blocks.best(Plane(), start, system)  # type: ignore[arg-type]
+    equations = PoseEquations.of(np.repeat(np.arange(count), 4), count, 2)
+    found, _ = best(equations, 3000.0, Plane(), start, system)  # type: ignore[arg-type]
     residual, slopes = (each.reshape(count, 4, -1) for each in system(found))
     pull = np.linalg.norm((slopes * residual).sum(axis=1), axis=1)
     nearest = np.linalg.norm(found.pose[:, None, :2] - ANCHORS, axis=2).min(axis=1)

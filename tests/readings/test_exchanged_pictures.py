@@ -1,0 +1,65 @@
+"""Pictures whose names, or columns of actuators, are exchanged are refused before a search."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import pkmcal as pk
+from pkmcal.readings import Board, Camera
+
+BOARD, COUNT = Board.chessboard(5, 4, 30), 16
+
+
+def taken(machine: str, above: float, share: float) -> pk.Measurements:
+    robot = pk.load(machine)
+    names = robot.geometry.match(["base*", "offset*"])
+    random = np.random.default_rng(3)
+    true = robot.replace({n: robot.geometry[n] + random.normal(0.0, 0.3) for n in names})
+    camera = Camera(
+        fx=1500.0, fy=1500.0, cx=640.0, cy=400.0,
+        stands=[0, 0, robot.home[2] + above, np.pi, 0.1, 0.2],
+        carried=[-60, -45, 20, np.pi, 0, 0.3],
+    )  # fmt: skip
+    q = robot.inverse(pk.sample_poses(robot, COUNT, seed=2, share=share))
+    at, seeing = camera.seeing(q, BOARD)
+    seen = pk.VirtualMachine(true, 0.05, 1).measure(at, seeing)
+    corners = len(BOARD.ids)
+    return replace(seen, group=np.repeat(np.arange(COUNT), corners))
+
+
+def placed(measured: pk.Measurements, machine: str = "hexapod") -> None:
+    pose = pk.load(machine).forward(measured.actuators).pose
+    measured.instrument.places_seen(measured, pose)
+
+
+@pytest.mark.parametrize("order", [{4: 9, 9: 4}, {2: 5, 5: 11, 11: 2}])
+def test_pictures_in_each_others_place_are_named(order: dict[int, int]) -> None:
+    measured = taken("hexapod", 1000.0, 0.3)
+    placed(measured)
+    values = measured.values.reshape(COUNT, len(BOARD.ids), 2).copy()
+    values[list(order)] = values[list(order.values())]
+    with pytest.raises(pk.ArgumentError, match="pictures are exchanged") as refused:
+        placed(replace(measured, values=values.reshape(-1, 2)))
+    assert all(f"{shown} shows {true}" in str(refused.value) for shown, true in order.items())
+
+
+def test_turned_pictures_among_sound_ones_are_named_and_not_said_to_be_exchanged() -> None:
+    """Two that are upside down are nearer to each other's place than to their own."""
+    measured = taken("hexapod", 1000.0, 0.3)
+    values = measured.values.copy()
+    turned = np.isin(measured.group, [3, 8])
+    values[turned] = np.array([1280.0, 800.0]) - values[turned]
+    with pytest.raises(pk.ArgumentError, match=f"2 of {COUNT} do not agree with the others: 3, 8"):
+        placed(replace(measured, values=values))
+
+
+def test_a_motion_that_is_mirrored_is_refused_of_a_machine_that_does_not_turn() -> None:
+    """As of a delta two of whose columns are exchanged: its places alone tell."""
+    measured = taken("linear-delta", 480.0, 0.9)
+    placed(measured, "linear-delta")
+    exchanged = replace(measured, actuators=measured.actuators[:, [0, 2, 1]])
+    with pytest.raises(pk.ArgumentError, match="differs by"):
+        placed(exchanged, "linear-delta")
