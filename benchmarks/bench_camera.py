@@ -2,8 +2,10 @@
 
 Machines with errors of 0.3 mm are seen by a camera of 2448 x 2048 pixels, 12 mm and 0.1 px of noise
 on a board of 10 x 5 corners: from beside the machine, or from its platform. Some read their
-actuators with an error of 10 µm that a picture shares. "Elsewhere" are 40 other poses, compared
-after the best motions of base and platform: what no camera without a datum tells is not counted.
+actuators with an error of 10 µm that a picture shares; some see markers or points in place of the
+board; of some the lens is found, or stated with its covariance. "Elsewhere" are 40 other poses,
+compared after the best motions of base and platform: what no camera without a datum tells is not
+counted.
 
     python -m benchmarks.bench_camera [RUNS [SCENARIO ...]]
     python -m benchmarks.bench_camera time
@@ -23,21 +25,27 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 import pkmcal as pk
-from pkmcal.arrays import FloatArray
+from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.estimation.compression import CompressedPrediction
-from pkmcal.estimation.least_squares import Search
+from pkmcal.estimation.estimator import Estimator
 from pkmcal.jobs.planned_camera import looking
 from pkmcal.readings import Board, Camera
+from pkmcal.readings.board_poses import unbent
 
 LENS = {
     "fx": 3478.0, "fy": 3478.0, "cx": 1223.5, "cy": 1023.5,
     "k1": -0.10, "k2": 0.08, "p1": 4e-4, "p2": -3e-4, "k3": -0.02, "width": 2448, "height": 2048,
 }  # fmt: skip
-NOISE, ERRORS, ELSEWHERE = 0.1, 0.3, 40  # px; mm and mrad; poses
+NOISE, ELSEWHERE = 0.1, 40  # px; poses
+DRAWN_BY = {"mm": 0.3, "rad": 1e-3, "1": 1e-4}  # errors of machines, by unit
 _FEWEST = 30  # of the poses elsewhere that machine and drawing both have to reach
 _TIMED = 7  # runs, of which the quickest counts
 _DRAWN = 20  # poses a picture, of which those are taken that show the whole board
 JOINTS = ("base*", "platform*", "offset*")
+LENS_SIGMA = (5.0, 5.0, 3.0, 3.0, 4e-3, 2e-2, 2e-4, 2e-4, 0.0)  # of lenses that are stated so
+STRAIGHT = dict.fromkeys(("k1", "k2", "p1", "p2", "k3"), 0.0)
+Seen = Literal["board", "markers", "points"]
+SPREAD = 90.0  # mm from the middle of the platform to markers and points
 
 
 @dataclass(frozen=True)
@@ -62,9 +70,14 @@ class Scenario:
     actuators : float
         Standard deviation of what actuators are off in a picture, mm.
     lens : str
-        What of the lens is found as well.
+        What of the lens is found as well; "stated": nothing, but the lens is off by what its
+        covariance says.
     on : str
         What the camera is on.
+    seen : str
+        One board, four markers whose places are unknown, or four points, of two cameras.
+    rectified : bool
+        Whether pixels are those of pictures whose distortion was undone.
     """
 
     pictures: int = 30
@@ -75,8 +88,10 @@ class Scenario:
     pitch: float = 20.0
     share: float = 0.3
     actuators: float = 0.0
-    lens: Literal["none", "focal"] = "none"
+    lens: Literal["none", "focal", "all", "stated"] = "none"
     on: Literal["base", "platform"] = "base"
+    seen: Seen = "board"
+    rectified: bool = False
 
 
 DELTA = Scenario(
@@ -94,6 +109,19 @@ SCENARIOS = {
     "3-RPS": Scenario(
         machine="3rps", free=(*JOINTS, "normal*"), eye=(500, -500, 3000), at=(0, 0, 1800), share=0.5
     ),
+    "hexapod, lens found": Scenario(lens="all"),
+    "hexapod, lens with covariance": Scenario(lens="stated"),
+    "hexapod, rectified pictures": Scenario(rectified=True),
+    "hexapod, four markers": Scenario(seen="markers"),
+    "hexapod, four points": Scenario(seen="points"),
+    "3-PRS, whole": Scenario(
+        machine="3prs",
+        free=(*JOINTS, "rod*", "slider*", "normal*"),
+        eye=(400, -400, 1700),
+        at=(0, 0, 750),
+        pitch=12,
+        share=0.6,
+    ),
 }
 
 
@@ -107,44 +135,85 @@ class Tally(NamedTuple):
     seconds: float
 
 
-def instrument(scenario: Scenario) -> tuple[Camera, Board]:
-    """The camera, mounted, and its board."""
+def instruments(scenario: Scenario) -> list[tuple[Camera, Board]]:
+    """Each camera, mounted, with each thing it sees."""
     grid = Board.chessboard(10, 5, scenario.pitch)
     board = Board.points(grid.ids.tolist(), grid.places - grid.places.mean(axis=0))
-    stands = pk.screw.to_pose(looking(np.array(scenario.eye), np.array(scenario.at)))
+    eye, at = np.array(scenario.eye), np.array(scenario.at)
+    stands = pk.screw.to_pose(looking(eye, at))
     carried: tuple[float, ...] = (10, -15, 20, np.pi + 0.03, -0.02, 0.3)
     if scenario.on == "platform":
         x, y, z = scenario.at
         board_at = pk.screw.from_pose(np.array([x + 40, y - 30, z + 700, 0.05, -0.04, 0.2]))
         stands, carried = pk.screw.to_pose(np.linalg.inv(board_at)), (20, -10, 30, 0.02, -0.03, 0.4)
-    camera = Camera(**LENS, on=scenario.on, lens=scenario.lens, stands=stands, carried=carried)  # type: ignore[arg-type]
-    return camera, board
+    found = "none" if scenario.lens == "stated" else scenario.lens
+    camera = Camera(**LENS, on=scenario.on, lens=found, stands=stands, carried=carried)  # type: ignore[arg-type]
+    if scenario.seen == "board":
+        return [(camera, board)]
+    markers = scenario.seen == "markers"
+    each = Board.apriltags(1, 1, 50, 10) if markers else Board.points([0], np.zeros((1, 3)))
+    cameras = {"": camera}
+    if not markers:
+        other = pk.screw.to_pose(looking(eye * [-1, 0.3, 1], at))
+        cameras = {"left": camera, "right": replace(camera, stands=other)}
+    turns = np.pi * (0.25 + 0.5 * np.arange(4))
+    return [
+        (
+            replace(
+                one, camera_name=name, board_name=f"m{i + 1}",
+                carried=(
+                    SPREAD * np.cos(turn), SPREAD * np.sin(turn), 15.0 + 8.0 * i,
+                    np.pi + 0.1 * np.cos(turn), 0.1 * np.sin(turn), 0.3 * i,
+                ),
+            ),
+            each,
+        )
+        for name, one in cameras.items()
+        for i, turn in enumerate(turns)
+    ]  # fmt: skip
 
 
 def measured(
     scenario: Scenario, random: np.random.Generator
-) -> tuple[pk.Robot, pk.Measurements] | None:
-    """A machine with errors and its pictures, those that show the whole board; None: broken."""
+) -> tuple[pk.Robot, list[pk.Measurements]] | None:
+    """A machine with errors and its pictures, those that show everything; None: broken."""
     robot = pk.load(scenario.machine)
     geometry = robot.geometry
-    unit = {n: 1e-3 if "tilt" in n else ERRORS for n in geometry.match(scenario.free)}
+    units = dict(zip(geometry.names, geometry.units, strict=True))
+    unit = {n: DRAWN_BY[units[n]] for n in geometry.match(scenario.free)}
     true = robot.replace({n: geometry[n] + random.normal(0.0, s) for n, s in unit.items()})
-    camera, board = instrument(scenario)
-    corners = len(board.ids)
     poses = pk.sample_poses(robot, _DRAWN * scenario.pictures, seed=0, share=scenario.share)
     q = robot.inverse(poses)
-    read_at, seeing = camera.seeing(
-        q + random.normal(0.0, 1.0, q.shape) * scenario.actuators, board
-    )
-    seen = pk.VirtualMachine(true, NOISE, int(random.integers(2**31))).measure(read_at, seeing)
-    whole = np.isfinite(seen.values).all(axis=1).reshape(-1, corners).all(axis=1)
+    at = q + random.normal(0.0, 1.0, q.shape) * scenario.actuators
+    machine = pk.VirtualMachine(true, NOISE, int(random.integers(2**31)))
+    sets, whole = [], np.ones(len(q), dtype=bool)
+    for camera, board in instruments(scenario):
+        seen = machine.measure(*camera.seeing(at, board))
+        whole &= np.isfinite(seen.values).all(axis=1).reshape(len(q), -1).all(axis=1)
+        sets.append(seen)
     taken = np.flatnonzero(whole)[: scenario.pictures]
     if len(taken) < scenario.pictures:
         return None
-    rows = (taken[:, None] * corners + np.arange(corners)).ravel()
-    own = seen.select(rows)
-    return true, pk.Measurements(
-        np.repeat(q[taken], corners, axis=0), own.values, own.instrument,
+    return true, [_pictures(scenario, seen, q, taken, random) for seen in sets]
+
+
+def _pictures(
+    scenario: Scenario, seen: pk.Measurements, q: FloatArray, taken: IntArray,
+    random: np.random.Generator,
+) -> pk.Measurements:  # fmt: skip
+    """Those that are taken, with the lens as it is stated."""
+    corners = len(seen) // len(q)
+    own = seen.select((taken[:, None] * corners + np.arange(corners)).ravel())
+    camera, values = own.instrument, own.values
+    if scenario.rectified:
+        lens = camera.lens_numbers()
+        values = unbent(values, np.tile(lens, (len(values), 1))) * lens[:2] + lens[2:4]
+        camera = replace(camera, **STRAIGHT)
+    if scenario.lens == "stated":
+        off = zip(camera.lens_numbers() + random.normal(0.0, LENS_SIGMA), LENS, strict=False)
+        camera = replace(camera, **{n: each for each, n in off}, lens_sigma=LENS_SIGMA)
+    return pk.Measurements(
+        np.repeat(q[taken], corners, axis=0), values, camera,
         group=np.repeat(np.arange(len(taken)), corners),
     )  # fmt: skip
 
@@ -242,7 +311,7 @@ def took() -> None:
 class Timed:
     """Processor time of evaluations and searches while it is entered."""
 
-    watched = ((CompressedPrediction, "of_set", "evaluation"), (Search, "best", "search"))
+    watched = ((CompressedPrediction, "of_set", "evaluation"), (Estimator, "best", "search"))
 
     def __enter__(self) -> None:
         self.spent: dict[str, list[float]] = {name: [] for *_, name in self.watched}

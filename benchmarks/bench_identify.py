@@ -17,7 +17,7 @@ import pkmcal as pk
 from benchmarks.timing import Report, medians, medians_of_made, times
 from pkmcal.estimation.begin import estimator_at
 from pkmcal.estimation.estimator import Estimator
-from pkmcal.estimation.loss import Loss
+from pkmcal.estimation.solving import solve
 from tests.simulated import hexapod_poses, tilted_poses, with_errors
 
 POSES, SIGMA, NOISE = 30, 0.5, 0.02
@@ -263,21 +263,14 @@ def bench_100_belts(report: Report, error: float) -> None:
     fit = found.fit
 
     def begin() -> Estimator:
-        return estimator_at(fit.uncertainty.equations, fit.equations, fit.start, "linear")
+        return estimator_at(fit.uncertainty.equations, fit.start, "linear")
 
     def alone() -> Callable[[], object]:
         """The least squares from there to the minimum."""
         made = begin()
         units, n = len(made.equations.blocks.components), len(made.scale)
-        loss = Loss("linear", made.equations.blocks.components, np.ones(units))
-        given = (
-            made.search.begin(),
-            np.zeros(n),
-            np.ones(len(made.unstated)),
-            loss,
-            np.empty((0, n)),
-        )
-        return lambda: made.search.best(*given)
+        given = np.zeros(n), np.ones(len(made.unstated)), np.ones(units), np.empty((0, n))
+        return lambda: made.best(*given)
 
     plain = PlainBelts(robot, log, begin().start.pose)
     for far in plain.fit(), plain.fit_with_slopes():
@@ -286,7 +279,7 @@ def bench_100_belts(report: Report, error: float) -> None:
             raise RuntimeError(f"the fits differ by {off} standard deviations")
     jobs: dict[str, Callable[[], Callable[[], object]]] = {
         "the solve alone": alone,
-        "with its start, rank and noise": lambda: lambda: begin().solve(),
+        "with its start, rank and noise": lambda: lambda: solve(begin()),
         "identify": lambda: lambda: pk.identify(robot, log),
         "NumPy and least_squares": lambda: plain.fit,
         "NumPy and least_squares, derivatives given": lambda: plain.fit_with_slopes,

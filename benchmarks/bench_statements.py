@@ -20,6 +20,7 @@ from pkmcal.estimation.begin import begun, estimator_at
 from pkmcal.estimation.datasets import as_fit_data, by_set
 from pkmcal.estimation.free_parameters import parameters
 from pkmcal.estimation.parameters import Asked
+from pkmcal.estimation.solving import solve
 from tests.simulated import hexapod_poses, tilted_poses, with_errors
 
 HERE = Path(__file__).parents[1]
@@ -106,8 +107,8 @@ def searched(case: Case, log: pk.Measurements) -> object:
     asked = Asked(
         case.options.get("free"), case.options.get("prior"), None, (), by_set(unknown), ()
     )
-    equations, commanded, start = begun(data, parameters(case.robot, data, asked), 0)
-    return estimator_at(equations, commanded, start, "linear").solve()
+    equations, start = begun(data, parameters(case.robot, data, asked), 0)
+    return solve(estimator_at(equations, start, "linear"))
 
 
 def bench_cost(report: Report) -> None:

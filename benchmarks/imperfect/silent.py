@@ -5,20 +5,58 @@ No residual names some of them; docs/model-errors.md lists those with their figu
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 import pkmcal as pk
-from benchmarks.imperfect.cases import Case, at_target, machine, off, scenario
+from benchmarks.imperfect.cases import Case, at_target, machine, noisy, off, scenario
 from benchmarks.imperfect.outsider import built, positions
 
 
 @scenario("other")
 def gains_of_a_rotary_delta(rng: np.random.Generator) -> Case:
     """Gears of the cranks that are wrong by 0.5 per mille; all else is found."""
-    robot, true, q, poses = built("rotary-delta", rng, 0.2, "*", 45)
-    true = true.replace({f"gain{i}": 1.0 + 5e-4 * rng.normal() for i in (1, 2, 3)})
+    return _of_gains(rng, 5e-4, built("rotary-delta", rng, 0.2, "*", 45))
+
+
+@scenario("other")
+def gains_of_a_linear_delta(rng: np.random.Generator) -> Case:
+    """Gains of a linear delta are wrong by a per mille, and nothing else is."""
+    return _of_gains(rng, 1e-3, built("linear-delta", rng, 0.0, "*", 50))
+
+
+def _of_gains(rng: np.random.Generator, share: float, delta: Any) -> Case:
+    """A delta of which also the gains are wrong, by a share."""
+    robot, true, q, poses = delta
+    true = true.replace({f"gain{i}": 1.0 + share * rng.normal() for i in (1, 2, 3)})
     there = true.forward(q, guess=poses).pose[:, :3]
     return Case(robot, true, pk.Measurements(q, positions(rng, there, 0.02), "position"))
+
+
+@scenario("seen")
+def wrist_a_row_late(rng: np.random.Generator) -> Case:
+    """Orientations of a wrist of three axes stand a row below their angles."""
+    arm = pk.SerialArm(np.eye(3)[[2, 1, 0]], np.zeros((3, 3)), np.eye(4))
+    true = arm.replace(rng.normal(size=(3, 6)) * [0.3, 0.3, 0.3, 1e-3, 1e-3, 1e-3])
+    theta = rng.uniform(-1.2, 1.2, (46, 3))
+    turned = pk.screw.to_pose(true.forward(theta))[:, 3:] + rng.normal(0.0, 1e-4, (46, 3))
+    return Case(arm, true, pk.Measurements(theta[1:], turned[:-1], "orientation"))
+
+
+@scenario("seen")
+def ratio_of_a_joint_that_follows(rng: np.random.Generator) -> Case:
+    """A joint follows another one by a ratio that is wrong by 2 per mille."""
+    axes = [[0, 0, 1], [0, 1, 0], [0, 1, 0], [1, 0, 0], [0, 1, 0]]
+    points = [[0, 0, 0], [0, 0, 300], [300, 0, 300], [500, 0, 300], [560, 0, 300]]
+    arm, other = (
+        pk.SerialArm(axes, points, [640, 0, 300, 0, 0, 0], follows={3: {2: ratio}})
+        for ratio in (-1.0, -1.0 + 2e-3 * rng.normal())
+    )
+    true = other.replace(rng.normal(size=(5, 6)) * [0.2, 0.2, 0.2, 5e-4, 5e-4, 5e-4])
+    theta = rng.uniform(-1.0, 1.0, (60, 4))
+    read = noisy(rng, pk.screw.to_pose(true.forward(theta)))
+    return Case(arm, true, pk.Measurements(theta, read, "pose"))
 
 
 def arm_of_four() -> pk.SerialArm:

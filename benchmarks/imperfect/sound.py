@@ -18,6 +18,7 @@ from benchmarks.imperfect.cases import (
     scenario,
     targets_of,
 )
+from benchmarks.imperfect.unseen import built
 
 
 @scenario("sound")
@@ -97,3 +98,23 @@ def sound_display(rng: np.random.Generator) -> Case:
     robot, true, q, read = hexapod(rng)
     read[:, :3] = np.round(read[:, :3], 2)
     return poses_of(robot, true, q, read)
+
+
+@scenario("sound")
+def sound_wrist(rng: np.random.Generator) -> Case:
+    """Three axes through one point, poses of the tool there: no length says how large it is."""
+    axes = rng.normal(size=(3, 3))
+    axes /= np.linalg.norm(axes, axis=1)[:, None]
+    arm = pk.SerialArm(axes, np.zeros((3, 3)), np.eye(4))
+    true = arm.replace(rng.normal(size=(3, 6)) * [0.3, 0.3, 0.3, 1e-3, 1e-3, 1e-3])
+    theta = rng.uniform(-1.2, 1.2, (45, 3))
+    read = noisy(rng, pk.screw.to_pose(true.forward(theta)))
+    return Case(arm, true, pk.Measurements(theta, read, "pose"))
+
+
+@scenario("sound")
+def sound_exechon(rng: np.random.Generator) -> Case:
+    """Forty-two numbers by poses: those of some of its joints are told only together."""
+    robot, true, q, poses = built("exechon", rng, 0.2, 60)
+    read = noisy(rng, true.forward(q, guess=poses).pose)
+    return Case(robot, true, pk.Measurements(q, read, "pose"))

@@ -11,6 +11,7 @@ It takes OpenCV (the extra vision).
 from __future__ import annotations
 
 import sys
+from functools import lru_cache
 from pathlib import Path
 
 import cv2
@@ -55,8 +56,7 @@ class Photographer:
         self._edge = self._margin + inside
         self._print = board_image(board, PER_MM, self._margin)
         self._random = np.random.default_rng(seed)
-        offsets = (np.arange(FINE) + 0.5) / FINE - 0.5
-        self._rays = [self._directions(du, dv) for du in offsets for dv in offsets]
+        self._rays = _rays(tuple(lens.items()))
 
     def take(self, motion: np.ndarray) -> np.ndarray:
         """The picture (height, width) of a board at `motion` (4, 4) in axes of the camera."""
@@ -69,19 +69,26 @@ class Photographer:
         light = cv2.GaussianBlur(light / len(self._rays), (0, 0), BLUR) * 0.75 + 25.0
         return (light + self._random.normal(0.0, GREY, light.shape)).clip(0, 255).astype(np.uint8)
 
-    def _directions(self, du: float, dv: float) -> np.ndarray:
-        """Rays (height, width, 3) that end beside the centres of pixels: distortion undone."""
-        lens = self.lens
-        v, u = np.mgrid[: lens["height"], : lens["width"]]
-        bent = np.stack([(u + du - lens["cx"]) / lens["fx"], (v + dv - lens["cy"]) / lens["fy"]], 2)
-        x, y = np.moveaxis(bent, 2, 0).copy()
-        for _ in range(12):
-            r2 = x * x + y * y
-            radial = 1.0 + r2 * (lens["k1"] + r2 * (lens["k2"] + r2 * lens["k3"]))
-            aside = 2 * lens["p1"] * x * y + lens["p2"] * (r2 + 2 * x * x)
-            down = lens["p1"] * (r2 + 2 * y * y) + 2 * lens["p2"] * x * y
-            x, y = (bent[..., 0] - aside) / radial, (bent[..., 1] - down) / radial
-        return np.stack([x, y, np.ones_like(x)], axis=2)
+
+@lru_cache(maxsize=1)
+def _rays(numbers: tuple[tuple[str, float], ...]) -> list[np.ndarray]:
+    """Rays (height, width, 3) through points all over each pixel, by a lens; kept for the next."""
+    offsets, lens = (np.arange(FINE) + 0.5) / FINE - 0.5, dict(numbers)
+    return [_directions(lens, du, dv) for du in offsets for dv in offsets]
+
+
+def _directions(lens: dict[str, float], du: float, dv: float) -> np.ndarray:
+    """Rays (height, width, 3) that end beside the centres of pixels: distortion undone."""
+    v, u = np.mgrid[: lens["height"], : lens["width"]]
+    bent = np.stack([(u + du - lens["cx"]) / lens["fx"], (v + dv - lens["cy"]) / lens["fy"]], 2)
+    x, y = np.moveaxis(bent, 2, 0).copy()
+    for _ in range(12):
+        r2 = x * x + y * y
+        radial = 1.0 + r2 * (lens["k1"] + r2 * (lens["k2"] + r2 * lens["k3"]))
+        aside = 2 * lens["p1"] * x * y + lens["p2"] * (r2 + 2 * x * x)
+        down = lens["p1"] * (r2 + 2 * y * y) + 2 * lens["p2"] * x * y
+        x, y = (bent[..., 0] - aside) / radial, (bent[..., 1] - down) / radial
+    return np.stack([x, y, np.ones_like(x)], axis=2)
 
 
 def looking(eye: np.ndarray, at: np.ndarray) -> np.ndarray:
