@@ -6,6 +6,7 @@ Imports next to nothing, so that they are provided for from the beginning.
 
 from __future__ import annotations
 
+import _thread
 import os
 import signal
 import sys
@@ -93,11 +94,16 @@ class IsRaised:
             raise Stopped(number)
 
     def _ignored(self, unraisable: sys.UnraisableHookArgs) -> None:
-        if not isinstance(unraisable.exc_value, Stopped):
+        if isinstance(unraisable.exc_value, Stopped):
+            # by no object of `threading`, whose locks the main thread may hold just here
+            _thread.start_new_thread(self._again, (unraisable.exc_value.number,))
+        else:
             self._hook(unraisable)
-            return
-        self._last = -_TWICE
-        threading.Timer(_AGAIN, _again, [unraisable.exc_value.number]).start()
+
+    def _again(self, number: int) -> None:
+        time.sleep(_AGAIN)
+        self._last = -_TWICE  # here, for in the hook the signal's second coming would be lost
+        _send(number)
 
     def __exit__(self, *_: object) -> None:
         sys.unraisablehook = self._hook
@@ -126,7 +132,7 @@ def _end(number: int, frame: FrameType | None) -> None:
     os._exit(128 + number)
 
 
-def _again(number: int) -> None:
+def _send(number: int) -> None:
     """Raise a signal in the main thread, whose sleep it ends."""
     main = threading.main_thread().ident
     if main is None or not hasattr(signal, "pthread_kill"):  # Windows

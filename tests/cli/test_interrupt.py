@@ -124,3 +124,28 @@ def test_a_signal_is_not_lost_that_comes_while_an_object_is_tidied_up(number: in
         time.sleep(30.0)
     assert stopped.value.number == number
     assert time.monotonic() - begun < 30.0
+
+
+def test_a_signal_that_comes_twice_while_an_object_is_tidied_up_is_raised_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As of a terminal that closes: the second one meets the hook that takes care of the first."""
+    raised = []
+    with IsRaised():
+        hook = sys.unraisablehook
+
+        def met(unraisable: sys.UnraisableHookArgs) -> None:
+            signal.raise_signal(signal.SIGTERM)
+            hook(unraisable)
+            signal.raise_signal(signal.SIGTERM)
+            time.sleep(0.0)
+
+        monkeypatch.setattr(sys, "unraisablehook", met)
+        for _ in range(2):
+            try:
+                if not raised:
+                    Asks(signal.SIGTERM)
+                time.sleep(0.5)
+            except Stopped as stopped:
+                raised.append(stopped.number)
+    assert raised == [signal.SIGTERM]
