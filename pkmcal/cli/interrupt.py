@@ -20,6 +20,7 @@ _NAMES = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")  # the last is that of a co
 _SIGNALS = [getattr(signal, name) for name in _NAMES if hasattr(signal, name)]
 _TWICE = 1.0  # s: a terminal that closes says so twice
 _AGAIN = 0.01  # s, after which a signal is raised again where Python ignored what it raised
+_PATIENCE = 30.0  # s, after which one is raised again that led to nothing
 _UNREAD = getattr(signal, "SIGPIPE", None)  # what is written to is closed; Windows has it not
 
 
@@ -76,10 +77,12 @@ class IsRaised:
     """While in this context: as KeyboardInterrupt, so that what was begun is tidied up.
 
     What is raised while Python tidies up an object, as in a callback of a weak reference, it prints
-    and ignores: such a signal is raised again.
+    and ignores: such a signal is raised again. So is one after which this context lasts: libraries
+    may pass over it, too, or keep a lock that they were just taking.
     """
 
     def __enter__(self) -> None:
+        self._lasts = True
         self._before = [signal.getsignal(number) for number in _SIGNALS]
         self._hook, sys.unraisablehook = sys.unraisablehook, self._ignored
         self._last = -_TWICE
@@ -91,21 +94,27 @@ class IsRaised:
     def _raise(self, number: int, frame: FrameType | None) -> None:
         before, self._last = self._last, time.monotonic()
         if self._last - before >= _TWICE:  # else it is being tidied up
+            self._soon(number, _PATIENCE)
             raise Stopped(number)
 
     def _ignored(self, unraisable: sys.UnraisableHookArgs) -> None:
         if isinstance(unraisable.exc_value, Stopped):
-            # by no object of `threading`, whose locks the main thread may hold just here
-            _thread.start_new_thread(self._again, (unraisable.exc_value.number,))
+            self._soon(unraisable.exc_value.number, _AGAIN)
         else:
             self._hook(unraisable)
 
-    def _again(self, number: int) -> None:
-        time.sleep(_AGAIN)
-        self._last = -_TWICE  # here, for in the hook the signal's second coming would be lost
-        _send(number)
+    def _soon(self, number: int, after: float) -> None:
+        # by no object of `threading`, whose locks the main thread may hold just here
+        _thread.start_new_thread(self._again, (number, after))
+
+    def _again(self, number: int, after: float) -> None:
+        time.sleep(after)
+        if self._lasts:
+            self._last = -_TWICE  # now: at once, and a signal that comes twice would be lost
+            _send(number)
 
     def __exit__(self, *_: object) -> None:
+        self._lasts = False
         sys.unraisablehook = self._hook
         for number, handler in zip(_SIGNALS, self._before, strict=True):
             if handler is not None:

@@ -8,10 +8,12 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
 
+from pkmcal.cli import interrupt
 from pkmcal.cli.interrupt import IsRaised, Stopped
 from pkmcal.files import atomic
 from pkmcal.files.atomic import write_whole
@@ -149,3 +151,26 @@ def test_a_signal_that_comes_twice_while_an_object_is_tidied_up_is_raised_once(
             except Stopped as stopped:
                 raised.append(stopped.number)
     assert raised == [signal.SIGTERM]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_is_raised_again_that_others_pass_over(
+    number: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(interrupt, "_PATIENCE", 0.3)
+    begun = time.monotonic()
+    with IsRaised(), pytest.raises(Stopped) as stopped:
+        with suppress(BaseException):
+            signal.raise_signal(number)
+            time.sleep(30.0)
+        time.sleep(30.0)
+    assert stopped.value.number == number
+    assert 0.3 <= time.monotonic() - begun < 30.0
+
+
+def test_a_signal_that_was_heard_is_not_raised_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(interrupt, "_PATIENCE", 0.1)
+    with pytest.raises(Stopped), IsRaised():
+        signal.raise_signal(signal.SIGINT)
+        time.sleep(30.0)
+    time.sleep(0.3)
