@@ -90,9 +90,11 @@ def board_poses(
         rows, among = _of_pictures(lost, picture, len(pose))
         some = corner[rows], pixel[rows], lens[rows], among
         for i, guess in enumerate(_guessed(some[0], direction[rows], among, _affinity)):
-            again, off = _aside(_refined(guess, *some)[0], 1.0 - 2.0 * i, *some)
-            better = off < rms[lost, i]
-            pose[lost[better], i], rms[lost[better], i] = again[better], off[better]
+            near = _refined(guess, *some)[0]
+            for side in (-1.0, 1.0):
+                again, off = _aside(near, side, *some)
+                better = off < rms[lost, i]
+                pose[lost[better], i], rms[lost[better], i] = again[better], off[better]
     turn = orientation.between(pose[:, 1, 3:], pose[:, 0, 3:])
     swap = rms[:, 1] < rms[:, 0]
     pose[swap], rms[swap] = pose[swap, ::-1], rms[swap, ::-1]
