@@ -23,7 +23,8 @@ from pkmcal.readings.alignment import (
 )
 
 _ALIKE = 1e-4  # share by which singular values differ of turnings that poses do not tell apart
-_ROUNDS = 30  # of turning frame and tool in turn
+_ROUNDS = 30  # of turning frame and tool
+_SETTLED = 1e-9  # rad, a step at which they are turned
 _LEAST = 1e-9  # share by which no turn is preferred to one about a line of places
 
 
@@ -54,12 +55,7 @@ def of_frame_and_tool(measured: FloatArray, pose: FloatArray) -> tuple[FloatArra
     kept = len(alike) > 1 and np.linalg.norm(unturned) > _ALIKE
     back = (unturned if kept else right[0]).reshape(3, 3).T  # Tᵀ but for its size and sign
     back = nearest_rotations(back if np.linalg.det(back) > 0 else -back)
-    for _ in range(_ROUNDS):
-        before = back
-        turn = nearest_rotations(_mean(m @ back @ p.transpose(0, 2, 1)))
-        back = nearest_rotations(_mean(m.transpose(0, 2, 1) @ turn @ p))
-        if np.array_equal(back, before):
-            break
+    turn, back = turned_alike(m, p, back)
     by_places = _turn_of_places(at, origin)
     starts = [
         (turn, back),
@@ -68,6 +64,52 @@ def of_frame_and_tool(measured: FloatArray, pose: FloatArray) -> tuple[FloatArra
     laid = [_laid(m, p, at, origin, *each) for each in starts]
     _, frame, tool = min(laid, key=lambda each: each[0])
     return frame, tool
+
+
+def turned_alike(m: FloatArray, p: FloatArray, back: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Rotations F and Tᵀ (3, 3) at which M Tᵀ and F P differ least, by those of Tᵀ nearby.
+
+    What they have in common is Σ tr(Fᵀ M Tᵀ Pᵀ): Newton's steps; where one makes it less, the best
+    F and the best Tᵀ in turn.
+    """
+    turned = p.transpose(0, 2, 1)
+
+    def in_turn(back: FloatArray) -> tuple[FloatArray, FloatArray]:
+        turn = nearest_rotations(_mean(m @ back @ turned))
+        return turn, nearest_rotations(_mean(m.transpose(0, 2, 1) @ turn @ p))
+
+    turn, back = in_turn(back)
+    own, other = turn.T @ m, back @ turned
+    for _ in range(_ROUNDS):
+        both, round_ = own @ other, (other @ own).sum(axis=0)
+        common = np.trace(both, axis1=1, axis2=2)
+        whole = both.sum(axis=0)
+        pull = np.concatenate([_axis(whole), -_axis(round_)])
+        normal = np.zeros((6, 6))
+        for part, each in ((slice(3), whole), (slice(3, 6), round_)):
+            normal[part, part] = np.trace(each) * np.eye(3) - 0.5 * (each + each.T)
+        normal[:3, 3:] = -((common[:, None, None] * np.eye(3) - both) @ own).sum(axis=0)
+        normal[3:, :3] = normal[:3, 3:].T
+        size, axes = np.linalg.eigh(normal)
+        told = np.abs(size) > _ALIKE * len(m)
+        step = axes[:, told] @ (axes[:, told].T @ pull / np.abs(size[told]))
+        first, second = orientation.turnings(step.reshape(2, 3))
+        trial = turn @ first, second @ back
+        own, other = trial[0].T @ m, trial[1] @ turned
+        if np.einsum("nij,nji->", own, other) < common.sum():
+            trial = in_turn(back)
+            step = trial[1] - back
+            own, other = trial[0].T @ m, trial[1] @ turned
+        turn, back = trial
+        if np.abs(step).max() < _SETTLED:
+            break
+    return turn, back
+
+
+def _axis(matrix: FloatArray) -> FloatArray:
+    """Of a matrix (3, 3) less its transpose."""
+    axis: FloatArray = matrix[[2, 0, 1], [1, 2, 0]] - matrix[[1, 2, 0], [2, 0, 1]]
+    return axis
 
 
 def _turn_of_places(at: FloatArray, origin: FloatArray) -> FloatArray:

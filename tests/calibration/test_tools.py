@@ -6,6 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import pkmcal as pk
 from pkmcal.arrays import FloatArray
@@ -16,7 +17,7 @@ from pkmcal.estimation.parameters import Asked
 from pkmcal.estimation.starts import with_starts
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.readings.hand_eye import of_frame_and_tool, of_tool
+from pkmcal.readings.hand_eye import of_frame_and_tool, of_tool, turned_alike
 
 from ..simulated import hexapod_poses
 
@@ -64,6 +65,38 @@ def test_a_tool_that_poses_do_not_tell_stays_unturned() -> None:
     exact = Measurements(poses, poses, "pose")
     frame, tool = of_frame_and_tool(carried(exact, STANDS[0], [0.0] * 6).values, poses)
     assert off(tool, [0.0] * 6).max() < 1e-9 and off(frame, STANDS[0]).max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("count", "turning", "noise", "odd"),
+    [
+        (30, 0.3, 1e-3, 0),
+        (30, 0.3, 0.1, 0),
+        (5, 0.3, 1e-3, 2),
+        (30, 1.5, 1e-3, 9),
+    ],
+)
+def test_frame_and_tool_are_turned_as_if_the_best_of_each_were_taken_in_turn(
+    count: int, turning: float, noise: float, odd: int
+) -> None:
+    """Which takes hundreds of rounds; also beside poses that are of something else."""
+    random = np.random.default_rng(1)
+
+    def drawn(count: int, most: float) -> FloatArray:
+        return Rotation.from_rotvec(random.uniform(-most, most, (count, 3))).as_matrix()
+
+    for _ in range(3):
+        p, (frame, tool) = drawn(count, turning), drawn(2, 3.0)
+        m = frame @ p @ tool @ drawn(count, noise)
+        m[:odd] = drawn(odd, 3.0) @ m[:odd]
+        start = tool.T @ drawn(1, 0.3)[0]
+        one, other = turned_alike(m, p, start)
+        back = start
+        for _ in range(2000):
+            turn = Rotation.from_matrix((m @ back @ p.transpose(0, 2, 1)).sum(axis=0)).as_matrix()
+            back = Rotation.from_matrix((m.transpose(0, 2, 1) @ turn @ p).sum(axis=0)).as_matrix()
+        for right, found in ((turn, one), (back, other)):
+            np.testing.assert_allclose(found, right, atol=1e-7)
 
 
 @pytest.mark.parametrize("framed", [False, True], ids=["frame known", "frame unknown"])
