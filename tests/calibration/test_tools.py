@@ -83,7 +83,10 @@ def test_frame_and_tool_are_turned_as_if_the_best_of_each_were_taken_in_turn(
     random = np.random.default_rng(1)
 
     def drawn(count: int, most: float) -> FloatArray:
-        return Rotation.from_rotvec(random.uniform(-most, most, (count, 3))).as_matrix()
+        turned: FloatArray = Rotation.from_rotvec(
+            random.uniform(-most, most, (count, 3))
+        ).as_matrix()
+        return turned
 
     for _ in range(3):
         p, (frame, tool) = drawn(count, turning), drawn(2, 3.0)
@@ -92,7 +95,7 @@ def test_frame_and_tool_are_turned_as_if_the_best_of_each_were_taken_in_turn(
         start = tool.T @ drawn(1, 0.3)[0]
         one, other = turned_alike(m, p, start)
         back = start
-        for _ in range(2000):
+        for _ in range(700):
             turn = Rotation.from_matrix((m @ back @ p.transpose(0, 2, 1)).sum(axis=0)).as_matrix()
             back = Rotation.from_matrix((m.transpose(0, 2, 1) @ turn @ p).sum(axis=0)).as_matrix()
         for right, found in ((turn, one), (back, other)):
