@@ -10,8 +10,9 @@ counted.
     python -m benchmarks.bench_camera [RUNS [SCENARIO ...]]
     python -m benchmarks.bench_camera time
 
-"time" prints what 5000 corners in 100 pictures take of a processor: one evaluation with
-derivatives, the search for 42 numbers and the frames, and all of `identify`.
+"time" prints what 5000 corners in 100 pictures take of a processor: finding where each picture has
+the board, one evaluation with derivatives, the search for 42 numbers and the frames, and all of
+`identify`.
 """
 
 from __future__ import annotations
@@ -293,7 +294,7 @@ def took() -> None:
     scenario = SCENARIOS["hexapod, 100 pictures"]
     drawn = measured(scenario, np.random.default_rng(3))
     assert drawn is not None
-    robot, pictures = pk.load(scenario.machine), drawn[1]
+    robot, (pictures,) = pk.load(scenario.machine), drawn[1]
     for name, sigma in (("exact actuators", np.zeros(6)), ("their scatter estimated", None)):
         least = dict[str, float]()
         for _ in range(_TIMED):
@@ -311,7 +312,11 @@ def took() -> None:
 class Timed:
     """Processor time of evaluations and searches while it is entered."""
 
-    watched = ((CompressedPrediction, "of_set", "evaluation"), (Estimator, "best", "search"))
+    watched = (
+        (Camera, "places_seen", "places of the pictures"),
+        (CompressedPrediction, "of_set", "evaluation"),
+        (Estimator, "best", "search"),
+    )
 
     def __enter__(self) -> None:
         self.spent: dict[str, list[float]] = {name: [] for *_, name in self.watched}

@@ -18,6 +18,20 @@ def exp(twist: FloatArray, isa: int | None = None) -> FloatArray:
     return rows("exp", twist, isa=isa)[0].reshape(-1, 16)
 
 
+def turnings(vectors: FloatArray) -> FloatArray:
+    """Rotation vectors (N, 3) to rotations (N, 3, 3)."""
+    twists = np.hstack([vectors, np.zeros_like(vectors)])
+    turns: FloatArray = exp(twists).reshape(-1, 4, 4)[:, :3, :3]
+    return turns
+
+
+def skew_vectors(matrix: FloatArray) -> FloatArray:
+    """Half the vectors (N, 3) of the skew parts of matrices (N, 3, 3): 0 of no turning."""
+    m = matrix
+    found = [m[:, 2, 1] - m[:, 1, 2], m[:, 0, 2] - m[:, 2, 0], m[:, 1, 0] - m[:, 0, 1]]
+    return np.stack(found, axis=1) / 2.0
+
+
 def log(motion: FloatArray, isa: int | None = None) -> FloatArray:
     """Motions (N, 16) to twists (N, 6)."""
     return rows("log", motion, isa=isa)[0]

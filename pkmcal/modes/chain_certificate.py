@@ -123,12 +123,12 @@ def closures(
         else:
             D = walk.axes @ R.swapaxes(1, 2)
             upright &= np.trace(D, axis1=1, axis2=2) > _UPRIGHT
-            r[:, :3] = length * _vee(D)
+            r[:, :3] = length * screws.skew_vectors(D)
             for j in range(m):
-                by[:, :3, j] = -_vee(D @ _skew(step[:3, j]))
+                by[:, :3, j] = -screws.skew_vectors(D @ _skew(step[:3, j]))
         for coordinate, w, v in walk.columns:
             if not layout.ball[chain]:
-                by[:, :3, m + coordinate] = _vee(_skew(w) @ D)
+                by[:, :3, m + coordinate] = screws.skew_vectors(_skew(w) @ D)
             slides = not w.any()
             by[:, 3:, m + coordinate] = v / (1.0 if slides else length)
         bent = walk.bend(length, _NEAR * length)
@@ -207,8 +207,7 @@ class _Walk:
                 continue
             if a < 0:
                 self.turning.append(place)
-            twists = np.hstack([x[:, None] * axis, np.zeros((n, 3))])
-            turned = screws.exp(twists).reshape(n, 4, 4)[:, :3, :3]
+            turned = screws.turnings(x[:, None] * axis)
             t = np.einsum("nij,nj->ni", R, point - turned @ point) + t
             R = R @ turned
         end, home = layout.end[chain], layout.home
@@ -236,12 +235,6 @@ class _Walk:
         pairs = sum(reach[max(i, j)] for i in self.turning for j in self.turning) + 0.0 * reach[0]
         bent: FloatArray = pairs / length**2 + 2.0 * len(self.turning) * self._slides / length
         return bent
-
-
-def _vee(D: FloatArray) -> FloatArray:
-    """Half the vectors (N, 3) of the skew parts of matrices (N, 3, 3)."""
-    found = [D[:, 2, 1] - D[:, 1, 2], D[:, 0, 2] - D[:, 2, 0], D[:, 1, 0] - D[:, 0, 1]]
-    return np.stack(found, axis=1) / 2.0
 
 
 def _skew(w: FloatArray) -> FloatArray:

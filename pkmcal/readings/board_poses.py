@@ -9,7 +9,7 @@ Own code: a table of pixels is enough to calibrate a machine, without a library 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -90,9 +90,7 @@ def board_poses(
         rows, among = _of_pictures(lost, picture, len(pose))
         some = corner[rows], pixel[rows], lens[rows], among
         for i, guess in enumerate(_guessed(some[0], direction[rows], among, _affinity)):
-            near = _refined(guess, *some)[0]
-            for side in (-1.0, 1.0):
-                again, off = _aside(near, side, *some)
+            for again, off in _aside(_refined(guess, *some)[0], *some):
                 better = off < rms[lost, i]
                 pose[lost[better], i], rms[lost[better], i] = again[better], off[better]
     turn = orientation.between(pose[:, 1, 3:], pose[:, 0, 3:])
@@ -296,9 +294,7 @@ def _turned_to(directions: FloatArray) -> FloatArray:
     cosine = directions[:, 2]
     angle = np.arctan2(np.linalg.norm(axis, axis=1), cosine)
     scale = np.where(angle > 0, angle / np.where(angle > 0, np.sin(angle), 1.0), 1.0)
-    twist = np.hstack([axis * scale[:, None], np.zeros_like(axis)])
-    turned: FloatArray = screws.exp(twist).reshape(-1, 4, 4)[:, :3, :3]
-    return turned
+    return screws.turnings(axis * scale[:, None])
 
 
 def _poses(turn: FloatArray, place: FloatArray) -> FloatArray:
@@ -338,14 +334,9 @@ def _refined(
 
 
 def _aside(
-    pose: FloatArray,
-    side: float,
-    corner: FloatArray,
-    pixel: FloatArray,
-    lens: FloatArray,
-    picture: IntArray,
-) -> tuple[FloatArray, FloatArray]:
-    """Return `_refined` from places (P, 6) turned a little, to one side, by what is told least.
+    pose: FloatArray, corner: FloatArray, pixel: FloatArray, lens: FloatArray, picture: IntArray
+) -> Iterator[tuple[FloatArray, FloatArray]]:
+    """Yield `_refined` from places (P, 6) turned a little, to either side, by what is told least.
 
     Between two places of a flat board there is one at which squares are level, and a search that
     begins near it ends there.
@@ -355,10 +346,11 @@ def _aside(
     known = np.isfinite(size).all(axis=1) & (size > 0.0).all(axis=1)
     scaled = normal[known] / (size[known, :, None] * size[known, None, :])
     least = np.linalg.eigh(scaled)[1][:, :, 0] / size[known]
-    turned = pose.copy()
-    turn = np.linalg.norm(least[:, :3], axis=1, keepdims=True)
-    turned[known] = _moved(pose[known], side * _ASIDE * least / turn)
-    return _refined(turned, corner, pixel, lens, picture)
+    least *= _ASIDE / np.linalg.norm(least[:, :3], axis=1, keepdims=True)
+    for side in (-1.0, 1.0):
+        turned = pose.copy()
+        turned[known] = _moved(pose[known], side * least)
+        yield _refined(turned, corner, pixel, lens, picture)
 
 
 def _equations(

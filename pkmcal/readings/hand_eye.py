@@ -2,10 +2,10 @@
 
 What was measured is M = F P T: the frame F, the platform's pose P, the tool T. The rotations follow
 from a singular value decomposition (M. Shah, Solving the robot-world/hand-eye calibration problem
-using the Kronecker product, Journal of Mechanisms and Robotics 5 (2013) 031007), the places
-linearly. Where poses hardly turn the frame's turn is that of their places: of both starts the one
-that misfits less is taken. What poses that turn too little do not determine stays where it is: a
-tool that is not turned against the platform.
+using the Kronecker product, Journal of Mechanisms and Robotics 5 (2013) 031007) and a few steps of
+Newton's, the places linearly. Where poses hardly turn the frame's turn is that of their places: of
+both starts the one that misfits less is taken. What poses that turn too little do not determine
+stays where it is: a tool that is not turned against the platform.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from pkmcal.arrays import FloatArray
+from pkmcal.core import screws
 from pkmcal.readings import orientation
 from pkmcal.readings.alignment import (
     TILT,
@@ -23,8 +24,8 @@ from pkmcal.readings.alignment import (
 )
 
 _ALIKE = 1e-4  # share by which singular values differ of turnings that poses do not tell apart
-_ROUNDS = 30  # of turning frame and tool
-_SETTLED = 1e-9  # rad, a step at which they are turned
+_ROUNDS = 30  # steps at most, by which frame and tool are turned
+_SETTLED = 1e-9  # rad; a smaller step ends the search
 _LEAST = 1e-9  # share by which no turn is preferred to one about a line of places
 
 
@@ -67,49 +68,54 @@ def of_frame_and_tool(measured: FloatArray, pose: FloatArray) -> tuple[FloatArra
 
 
 def turned_alike(m: FloatArray, p: FloatArray, back: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Rotations F and Tᵀ (3, 3) at which M Tᵀ and F P differ least, by those of Tᵀ nearby.
+    """Rotations F and Tᵀ (3, 3) at which M Tᵀ and F P differ least; `back` is Tᵀ to begin with.
 
-    What they have in common is Σ tr(Fᵀ M Tᵀ Pᵀ): Newton's steps; where one makes it less, the best
-    F and the best Tᵀ in turn.
+    They differ least where Σ tr(Fᵀ M Tᵀ Pᵀ) is largest. Newton's steps lead there; where one makes
+    the sum smaller, the best F for this Tᵀ and then the best Tᵀ for that F, which never do.
     """
-    turned = p.transpose(0, 2, 1)
+    p_back = p.transpose(0, 2, 1)
 
-    def in_turn(back: FloatArray) -> tuple[FloatArray, FloatArray]:
-        turn = nearest_rotations(_mean(m @ back @ turned))
+    def best_of_each(back: FloatArray) -> tuple[FloatArray, FloatArray]:
+        turn = nearest_rotations(_mean(m @ back @ p_back))
         return turn, nearest_rotations(_mean(m.transpose(0, 2, 1) @ turn @ p))
 
-    turn, back = in_turn(back)
-    own, other = turn.T @ m, back @ turned
+    turn, back = best_of_each(back)
+    left, right = turn.T @ m, back @ p_back
     for _ in range(_ROUNDS):
-        both, round_ = own @ other, (other @ own).sum(axis=0)
-        common = np.trace(both, axis1=1, axis2=2)
-        whole = both.sum(axis=0)
-        pull = np.concatenate([_axis(whole), -_axis(round_)])
-        normal = np.zeros((6, 6))
-        for part, each in ((slice(3), whole), (slice(3, 6), round_)):
-            normal[part, part] = np.trace(each) * np.eye(3) - 0.5 * (each + each.T)
-        normal[:3, 3:] = -((common[:, None, None] * np.eye(3) - both) @ own).sum(axis=0)
-        normal[3:, :3] = normal[:3, 3:].T
-        size, axes = np.linalg.eigh(normal)
-        told = np.abs(size) > _ALIKE * len(m)
-        step = axes[:, told] @ (axes[:, told].T @ pull / np.abs(size[told]))
-        first, second = orientation.turnings(step.reshape(2, 3))
-        trial = turn @ first, second @ back
-        own, other = trial[0].T @ m, trial[1] @ turned
-        if np.einsum("nij,nji->", own, other) < common.sum():
-            trial = in_turn(back)
-            step = trial[1] - back
-            own, other = trial[0].T @ m, trial[1] @ turned
-        turn, back = trial
+        step = _newton_step(left, right)
+        first, second = screws.turnings(step.reshape(2, 3))
+        before, last = float(np.einsum("nij,nji->", left, right)), back
+        turn, back = turn @ first, second @ last
+        left, right = turn.T @ m, back @ p_back
+        if float(np.einsum("nij,nji->", left, right)) < before:
+            turn, back = best_of_each(last)
+            left, right, step = turn.T @ m, back @ p_back, back - last
         if np.abs(step).max() < _SETTLED:
             break
     return turn, back
 
 
-def _axis(matrix: FloatArray) -> FloatArray:
-    """Of a matrix (3, 3) less its transpose."""
-    axis: FloatArray = matrix[[2, 0, 1], [1, 2, 0]] - matrix[[1, 2, 0], [2, 0, 1]]
-    return axis
+def _newton_step(left: FloatArray, right: FloatArray) -> FloatArray:
+    """Turn F by a and Tᵀ by b (a, b: (6,)) so that Σ tr(L R) grows most.
+
+    L = Fᵀ M and R = Tᵀ Pᵀ, (N, 3, 3); behind the step L is exp(-a) L and R is exp(b) R. What poses
+    do not tell is not turned.
+    """
+    both = left @ right
+    sums = np.stack([both.sum(axis=0), (right @ left).sum(axis=0)])
+    of_a, of_b = 2.0 * screws.skew_vectors(sums)
+    bent = np.zeros((6, 6))  # less the second derivatives
+    for part, each in ((slice(3), sums[0]), (slice(3, 6), sums[1])):
+        bent[part, part] = np.trace(each) * np.eye(3) - 0.5 * (each + each.T)
+    traces = np.trace(both, axis1=1, axis2=2)[:, None, None]
+    bent[:3, 3:] = -((traces * np.eye(3) - both) @ left).sum(axis=0)
+    bent[3:, :3] = bent[:3, 3:].T
+    size, axes = np.linalg.eigh(bent)
+    told = np.abs(size) > _ALIKE * len(left)
+    step: FloatArray = axes[:, told] @ (
+        axes[:, told].T @ np.concatenate([of_a, -of_b]) / np.abs(size[told])
+    )
+    return step
 
 
 def _turn_of_places(at: FloatArray, origin: FloatArray) -> FloatArray:

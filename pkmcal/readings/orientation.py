@@ -33,16 +33,9 @@ def between(measured: FloatArray, predicted: FloatArray) -> FloatArray:
     return vectors
 
 
-def turnings(vectors: FloatArray) -> FloatArray:
-    """Rotations (N, 3, 3) by rotation vectors (N, 3)."""
-    motions = screws.exp(np.hstack([vectors, np.zeros_like(vectors)])).reshape(-1, 4, 4)
-    turns: FloatArray = motions[:, :3, :3]
-    return turns
-
-
 def turned(angles: FloatArray, vectors: FloatArray) -> FloatArray:
     """Angles (N, 3) turned by rotation vectors (N, 3); `between` gives these back."""
-    found: FloatArray = screws.pose(_motions(turnings(vectors) @ rotations(angles)))[:, 3:]
+    found: FloatArray = screws.pose(_motions(screws.turnings(vectors) @ rotations(angles)))[:, 3:]
     return found
 
 
