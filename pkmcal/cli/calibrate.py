@@ -9,7 +9,14 @@ from typing import Annotated
 import typer
 
 from pkmcal.calibration.identification import Identification
-from pkmcal.cli.camera_options import BoardSize, BoardsSeen, CameraOn, Lenses, LensFound
+from pkmcal.cli.camera_options import (
+    BoardSize,
+    BoardSizeKnown,
+    BoardsSeen,
+    CameraOn,
+    Lenses,
+    LensFound,
+)
 from pkmcal.cli.measured import (
     Columns,
     Controller,
@@ -121,6 +128,7 @@ def calibrate(
     ] = "known",
     lens: LensFound = "none",
     find_size: BoardSize = False,
+    size_sigma: BoardSizeKnown = 0.0,
     effects: Annotated[
         list[str] | None, typer.Option(rich_help_panel=UNKNOWN, metavar="WORDS", help=EFFECTS)
     ] = None,

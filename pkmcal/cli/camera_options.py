@@ -77,6 +77,16 @@ BoardSize = Annotated[
         help="Identify by how much the board is larger than stated, too.",
     ),
 ]
+BoardSizeKnown = Annotated[
+    float,
+    typer.Option(
+        "--size-sigma",
+        rich_help_panel=READING,
+        metavar="SHARE",
+        help="Standard deviation of the board's size as a share, such as 0.0005 where 500 mm of it"
+        " were measured to 0.25: every ± then contains it.",
+    ),
+]
 
 
 CameraAt = Annotated[

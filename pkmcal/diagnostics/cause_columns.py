@@ -299,10 +299,10 @@ def _of_instruments(fit: Fit) -> Iterator[Cause]:
     """Causes that instruments have: numbers of theirs that the fit holds."""
     kinds = {type(data.measured.instrument) for data in fit.equations.prediction.datasets}
     for each in dict.fromkeys(held for kind in kinds for held in kind.held):
-        yield Cause(each.name, each.cure, _held(each))
+        yield Cause(each.name, each.cure, columns_of_held(each))
 
 
-def _held(held: HeldNumbers) -> Callable[[Fit], Columns | None]:
+def columns_of_held(held: HeldNumbers) -> Callable[[Fit], Columns | None]:
     """Columns of instruments' numbers, all moved alike, in sets that do not look for them."""
 
     def columns(fit: Fit) -> Columns | None:

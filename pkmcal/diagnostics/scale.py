@@ -1,4 +1,4 @@
-"""The size of a machine, where one thing alone tells it: a board, printed larger or smaller."""
+"""Things of stated size that tell how large a machine is: a board, printed larger or smaller."""
 
 from __future__ import annotations
 
@@ -6,14 +6,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray
+from pkmcal.arrays import FloatArray, rms
 from pkmcal.core import screws
+from pkmcal.diagnostics.cause_columns import columns_of_held
 from pkmcal.diagnostics.check import Check, at_most_one
+from pkmcal.fitted.fit import Fit
+from pkmcal.fitted.machine_accuracy import machine_accuracy, machine_rates
 from pkmcal.fitted.solution import Solution
+from pkmcal.statistics.score_test import beside
 
 _FEW = 5  # poses, of which a size is compared
 _GROWN = 3e-3  # share by which a machine has become larger, from which on no part was made so badly
 _ALIKE = 3.0  # times what else has changed in where the machine goes
+_PRINTED = 2e-3  # share by which printers are off
+_SIZE = "size"  # what readings call the number
 
 
 @dataclass(frozen=True)
@@ -23,9 +29,15 @@ class Scale:
     Attributes
     ----------
     by : str
-        The one thing of stated size.
-    found : bool
-        Whether its size is found, not stated.
+        The thing of stated size.
+    alone : bool
+        Whether nothing else that was measured has a length.
+    known : float
+        Standard deviation of its size as a share: 0 where it counts as exact, inf where it is found
+        from nothing.
+    harmful : float
+        Share by which it may be larger than stated until the machine is off by as much as ± state;
+        inf where its size is not held.
     grown : float
         How much larger the machine has become, all of it alike; 0.04: by 4 %.
     rest : float
@@ -33,29 +45,65 @@ class Scale:
     """
 
     by: str
-    found: bool
+    alone: bool
+    known: float
+    harmful: float
     grown: float
     rest: float
 
     @property
     def doubtful(self) -> bool:
         """Whether the thing hardly has the size that is stated."""
-        return self.found or abs(self.grown) > max(_GROWN, _ALIKE * self.rest)
+        if not self.alone:
+            return False
+        return np.isinf(self.known) or abs(self.grown) > max(_GROWN, _ALIKE * self.rest)
 
 
 def scale_by_one(found: Solution) -> Scale | None:
-    """Find the one thing that tells how large the machine is; None where there are several."""
-    machine = found.fit.end.robot
-    by = {m.instrument.scaled_by for m in found.fit.uncertainty.equations.table.sets}
-    if len(by) != 1 or "" in by:
+    """Find the thing of stated size on which the machine rests; None where that does no harm."""
+    fit = found.fit
+    by = {m.instrument.scaled_by for m in fit.uncertainty.equations.table.sets}
+    things = by - {""}
+    if len(things) != 1:
         return None
+    (thing,) = things
+    machine = fit.end.robot
     gains = [f"gain{i + 1}" for i, unit in enumerate(machine.actuator_units) if unit == "mm"]
-    if not {*gains} <= {*found.free}:
+    alone, harmful = len(by) == 1 and {*gains} <= {*found.free}, _harmful(fit)
+    if not alone and harmful > _PRINTED:
         return None
-    thing = by.pop()
-    return Scale(
-        thing, f"{thing}.size" in found.free, *_grown(found.fit.start.pose, found.fit.end.pose)
-    )
+    return Scale(thing, alone, _known(fit, thing), harmful, *_grown(fit.start.pose, fit.end.pose))
+
+
+def _known(fit: Fit, thing: str) -> float:
+    """How well the sizes of things are known, the worst of them."""
+    chosen = fit.parameters
+    sizes = [
+        i for i, name in enumerate(chosen.names)
+        if name.startswith(f"{thing}.") and name.endswith(f".{_SIZE}")
+    ]  # fmt: skip
+    sigma = chosen.prior.copy()
+    sigma[chosen.uncertain] = np.sqrt(np.diagonal(chosen.spread))
+    return float(sigma[sizes].max(initial=0.0))
+
+
+def _harmful(fit: Fit) -> float:
+    """Find the share of all sizes that are held that moves the machine by as much as ± state."""
+    sure, end = fit.uncertainty, fit.end
+    kinds = {type(m.instrument) for m in sure.equations.table.sets}
+    held = {each for kind in kinds for each in kind.held if each.argument == _SIZE}
+    known = np.isfinite(end.pose).all(axis=1)
+    if len(held) != 1 or not known.any() or not sure.known:
+        return np.inf
+    columns = columns_of_held(held.pop())(fit)
+    taken = None if columns is None else beside(sure.fit, columns)
+    if taken is None:
+        return np.inf
+    places = fit.parameters.robot.as_commands(end.pose, end.actuators)[known]
+    moved = (sure.reported @ taken.by_basis[:, 0])[fit.parameters.geometry_of()]
+    off = rms(np.linalg.norm(machine_rates(fit, places, places) @ moved, axis=1))
+    stated = rms(machine_accuracy(fit, places, places))
+    return stated / off if off > 0.0 and np.isfinite(stated) else np.inf
 
 
 def _grown(start: FloatArray, end: FloatArray) -> tuple[float, float]:
@@ -82,25 +130,32 @@ def _grown(start: FloatArray, end: FloatArray) -> tuple[float, float]:
 
 def _text(found: Solution, seen: Scale) -> str:
     thing, percent = seen.by, 100.0 * abs(seen.grown)
-    if seen.found:
+    if seen.alone and np.isinf(seen.known):
         return (
             f"nothing that was measured has a length: with the size of the {thing} unknown the"
             " machine stays as large as drawn; state the size, or measure one distance"
         )
     rests = f"how large the machine is rests on the {thing} alone"
-    if not seen.doubtful:
-        return f"{rests}: a {thing} that is 0.2 % larger than stated makes it 0.2 % larger"
-    machine, other = ("larger", "smaller") if seen.grown > 0 else ("smaller", "larger")
+    if seen.doubtful:
+        machine, other = ("larger", "smaller") if seen.grown > 0 else ("smaller", "larger")
+        return (
+            f"{rests}, and all of it has become {percent:.2g} % {machine} than drawn: the {thing}"
+            f" is rather {percent:.2g} % {other} than stated; measure it and state its size as it"
+            " is, or measure one distance of the machine"
+        )
+    if seen.known:
+        return f"{rests}, whose size is stated to {100.0 * seen.known:.2g} %"
+    one = f"{rests}: one" if seen.alone else f"a {thing}"
     return (
-        f"{rests}, and all of it has become {percent:.2g} % {machine} than drawn: the {thing} is"
-        f" rather {percent:.2g} % {other} than stated; measure it and state its size as it is, or"
-        " measure one distance of the machine"
+        f"{one} that is {100.0 * seen.harmful:.1g} % larger or smaller than stated puts the machine"
+        " off by as much as its ± say; state how well the size is known, --size-sigma"
+        " (size_sigma=), and they contain it"
     )
 
 
 CHECKS = (
     Check(
-        name="scale", about="one thing of stated size that alone tells how large the machine is",
+        name="scale", about="a thing of stated size on which the size of the machine rests",
         levels=("remark", "doubt"), run=lambda found: at_most_one(scale_by_one(found)), say=_text,
         level_of=lambda found, seen: "doubt" if seen.doubtful else "remark",
     ),

@@ -35,18 +35,27 @@ def machine_accuracy(fit: Fit, places: FloatArray, reference: FloatArray) -> Flo
     ndarray (N,)
         inf where it moves along with what the measurements do not determine.
     """
+    alone = machine_rates(fit, places, reference)
+    own = fit.parameters.geometry_of()
+    variance = propagate(alone, fit.covariance[np.ix_(own, own)])
+    undetermined = (fit.undetermined() * fit.parameters.scale[:, None])[own]
+    moved = np.linalg.norm(alone @ undetermined, axis=(1, 2))
+    return np.where(moved < UNDETERMINED, np.sqrt(variance), np.inf)
+
+
+def machine_rates(fit: Fit, places: FloatArray, reference: FloatArray) -> FloatArray:
+    """How the platform's places (N, 3, g) follow numbers, but for motions of its frames.
+
+    Numbers are those of `Parameters.geometry_of`; places and reference as of `machine_accuracy`.
+    """
     rates, motions = _rates(fit, reference)
     left, size, right = np.linalg.svd(motions.reshape(-1, 12), full_matrices=False)
     told = size > _TOLD * size[0]
     flat = rates.reshape(len(left), -1)
     follow = right[told].T @ ((left[:, told].T @ flat) / size[told, None])
     own_rates, own_motions = _rates(fit, places)
-    alone = (own_rates - own_motions @ follow)[:, 3:]
-    own = fit.parameters.geometry_of()
-    variance = propagate(alone, fit.covariance[np.ix_(own, own)])
-    undetermined = (fit.undetermined() * fit.parameters.scale[:, None])[own]
-    moved = np.linalg.norm(alone @ undetermined, axis=(1, 2))
-    return np.where(moved < UNDETERMINED, np.sqrt(variance), np.inf)
+    alone: FloatArray = (own_rates - own_motions @ follow)[:, 3:]
+    return alone
 
 
 def _rates(fit: Fit, places: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -168,7 +168,7 @@ def cameras(reading: Reading) -> list[Camera]:
     return [
         Camera.from_file(
             file, on=mount, board=board, lens=chosen, find_size=reading.find_size,
-            camera_name=name, board_name=of_board,
+            size_sigma=reading.size_sigma, camera_name=name, board_name=of_board,
         )
         for name, file in map(named, reading.camera)
         for of_board, board in boards

@@ -34,7 +34,7 @@ class Reading(Stated):
         Poses are those of a board that other software found in pictures: "f=640,board=160x120".
     camera, board : tuple of str
         The lens file of a camera, and what it sees; of several each as "NAME=…".
-    camera_on, lens, find_size
+    camera_on, lens, find_size, size_sigma
         What cameras are fixed to, what is unknown of them and of boards.
 
     Examples
@@ -65,6 +65,7 @@ class Reading(Stated):
     board: tuple[str, ...] = ()
     lens: str = "none"
     find_size: bool = False
+    size_sigma: float = 0.0
 
     def __post_init__(self) -> None:
         super().__post_init__()

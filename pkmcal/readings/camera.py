@@ -19,7 +19,7 @@ from typing import Any, ClassVar, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pkmcal.arguments import word
+from pkmcal.arguments import number, word
 from pkmcal.arrays import FloatArray, IntArray, as_rows, first_of_equal
 from pkmcal.core import instruments, screws
 from pkmcal.core.poses import NOWHERE
@@ -52,6 +52,7 @@ from pkmcal.readings.unknowns import Found as Starts
 
 Mount = Literal["base", "platform"]
 _NO_SIZE = np.zeros(1)
+_LARGEST = 0.1  # share by which a board's size may be stated to be unknown
 
 
 def _dotted(*words: str) -> str:
@@ -99,6 +100,9 @@ class Camera(Reading):
         before: it is then fitted along within these, where `lens` finds nothing of it.
     find_size : bool
         Whether the board may be larger than stated, by ``board.size`` (0.001: by 0.1 %).
+    size_sigma : float
+        Standard deviation of that share, where the board was measured or its printer is known
+        (0.0005: 0.25 mm of 500): it is then fitted along within it, and all ± contain it.
     camera_name, board_name : str
         Which they are, where a calibration has several: the unknowns then are ``frame.left.x`` …,
         ``tool.board.plate.x`` …, ``lens.left.fx`` … and ``board.plate.size`` of the camera "left"
@@ -139,6 +143,7 @@ class Camera(Reading):
     height: int = 0
     lens: Found = "none"
     find_size: bool = False
+    size_sigma: float = 0.0
     lens_sigma: ArrayLike | None = None
     board: Board | None = None
     camera_name: str = ""
@@ -167,7 +172,9 @@ class Camera(Reading):
             "lens", (4, 5, 6, 7),
         ),
         HeldNumbers(
-            "a board of another size", "measure it, or --find-size (find_size=True)", "size", (0,)
+            "a board of another size",
+            "measure it, and --size-sigma (size_sigma=) or --find-size (find_size=True)",
+            "size", (0,),
         ),
         HeldNumbers(
             "a detector that puts corners of tags further out, or in, than they are",
@@ -392,14 +399,16 @@ class Camera(Reading):
         found = {self.camera_name: self._lens_found(m, slots, known)} if slots else {}
         role = "lens" if known is None else "lens as stated"
         yield Dependence("lens", role, lens, found, every, Nature(alone=True))
-        if self.find_size:
+        if self.find_size or self.size_sigma:
             extent = float(np.abs(self._corners(count)).max(initial=1.0))
-            number = Numbers(
+            own = Numbers(
                 (_dotted("board", self.board_name, "size"),), ("1",),
                 np.zeros(1, dtype=np.intp), np.zeros(1), np.array([1.0 / extent]),
+                None if self.find_size else np.array([[float(self.size_sigma) ** 2]]),
             )  # fmt: skip
-            sizes = {self.board_name: number}
-            yield Dependence("size", "size", np.zeros((count, 1)), sizes, every)
+            role = "size" if self.find_size else "size as stated"
+            sizes = {self.board_name: own}
+            yield Dependence("size", role, np.zeros((count, 1)), sizes, every)
 
     def as_found(self, numbers: Mapping[str, float]) -> Camera:
         """The camera where it is, with its lens, before a board of its size."""
@@ -414,6 +423,7 @@ class Camera(Reading):
             "lens": "none",
             "lens_sigma": None,
             "find_size": False,
+            "size_sigma": 0.0,
             "stands": place(_dotted("frame", self.frame_name)),
             "carried": place(_dotted("tool", self._carried_thing)),
         }
@@ -528,8 +538,22 @@ class Camera(Reading):
             )
         if self.lens_sigma is not None:
             covariance_of_lens(self.lens_sigma)
+        self._check_size()
         own, read = super().of_rows(values, actuators, targets)
         return own, read
+
+    def _check_size(self) -> None:
+        """Refuse a deviation of the board's size that is none, or beside one that is found."""
+        sigma = number("size_sigma", self.size_sigma, least=0.0)
+        if sigma > _LARGEST:
+            raise ArgumentError(
+                "size_sigma: a share of the size of the board, such as 0.001, which"
+                f" is 0.1 %, and at most {_LARGEST:g}; found {sigma:g}"
+            )
+        if sigma and self.find_size:
+            raise ArgumentError(
+                "size_sigma: find_size=True finds the board's size from nothing; state one of both"
+            )
 
     @property
     def _carried(self) -> Literal["board", "camera"]:

@@ -198,7 +198,7 @@ def test_a_picture_that_carries_the_fit_is_grave_and_left_out_as_advised() -> No
 @pytest.mark.parametrize(
     ("machine", "free", "size", "level"),
     [
-        ("hexapod", ["base*"], False, None),
+        ("hexapod", ["base*"], False, "remark"),
         ("hexapod", ["base*"], True, None),
         ("hexapod", ["base*", "gain*"], False, "remark"),
         ("hexapod", ["base*", "gain*"], True, "doubt"),
