@@ -110,7 +110,7 @@ def beside_causes(found: Solution, weighed: Weighed, residual: float) -> LinearF
         own = beside(fit, columns[each.cause])
         score = None if own is None else own.score()
         if own is not None and score is not None:
-            fit = taken_along(own, score)
+            fit = taken_along(own)
     before = weighed.fit
     left = fit.squares * before.freedom / (before.squares * max(fit.freedom, 1.0))
     return fit if fit is not before and left <= residual**2 else None

@@ -28,6 +28,7 @@ from pkmcal.diagnostics import (
     scale,
     search,
     sides,
+    stated_points,
     units,
     waves,
 )
@@ -38,6 +39,7 @@ CHECKS = verified((
     *families.CHECKS, *machine.CHECKS, *other_starts.CHECKS, *loads.CHECKS, *sag.CHECKS,
     *search.CHECKS, *rows.CHECKS, *elsewhere.CHECKS, *near_copies.CHECKS, *rounded.CHECKS,
     *noise.CHECKS, *priors.CHECKS, *course.CHECKS, *causes.CHECKS, *moved_instrument.CHECKS,
-    *scale.CHECKS, *sides.CHECKS, *regions.CHECKS, *gain.CHECKS, *waves.CHECKS,
+    *stated_points.CHECKS, *scale.CHECKS, *sides.CHECKS, *regions.CHECKS, *gain.CHECKS,
+    *waves.CHECKS,
 ))  # fmt: skip
 AT_ONCE = tuple(check for check in CHECKS if check.at_once)

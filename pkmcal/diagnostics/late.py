@@ -144,6 +144,6 @@ def _beside_other_causes(found: Solution, seen: Late, lag: Beside, score: Score)
 
 def _chance_after(taken: Beside, score: Score, other: Beside) -> float:
     """Chance of the other columns beside what these explain; 1 where nothing is left of them."""
-    after = beside(taken_along(taken, score), other.columns)
+    after = beside(taken_along(taken), other.columns)
     found = None if after is None else after.score()
     return 1.0 if found is None else found.chance

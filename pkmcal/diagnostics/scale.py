@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, rms
+from pkmcal.arrays import FloatArray
 from pkmcal.core import screws
 from pkmcal.diagnostics.cause_columns import columns_of_held
 from pkmcal.diagnostics.check import Check, at_most_one
 from pkmcal.fitted.fit import Fit
-from pkmcal.fitted.machine_accuracy import machine_accuracy, machine_rates
+from pkmcal.fitted.machine_accuracy import times_stated
 from pkmcal.fitted.solution import Solution
 from pkmcal.statistics.score_test import beside
 
@@ -89,21 +89,15 @@ def _known(fit: Fit, thing: str) -> float:
 
 def _harmful(fit: Fit) -> float:
     """Find the share of all sizes that are held that moves the machine by as much as ± state."""
-    sure, end = fit.uncertainty, fit.end
+    sure = fit.uncertainty
     kinds = {type(m.instrument) for m in sure.equations.table.sets}
     held = {each for kind in kinds for each in kind.held if each.argument == _SIZE}
-    known = np.isfinite(end.pose).all(axis=1)
-    if len(held) != 1 or not known.any() or not sure.known:
-        return np.inf
-    columns = columns_of_held(held.pop())(fit)
+    columns = columns_of_held(held.pop())(fit) if len(held) == 1 and sure.known else None
     taken = None if columns is None else beside(sure.fit, columns)
     if taken is None:
         return np.inf
-    places = fit.parameters.robot.as_commands(end.pose, end.actuators)[known]
-    moved = (sure.reported @ taken.by_basis[:, 0])[fit.parameters.geometry_of()]
-    off = rms(np.linalg.norm(machine_rates(fit, places, places) @ moved, axis=1))
-    stated = rms(machine_accuracy(fit, places, places))
-    return stated / off if off > 0.0 and np.isfinite(stated) else np.inf
+    times = times_stated(fit, fit.parameters.scale[:, None] * sure.fit.back @ taken.by_basis)
+    return 1.0 / times if times > 0.0 else np.inf
 
 
 def _grown(start: FloatArray, end: FloatArray) -> tuple[float, float]:

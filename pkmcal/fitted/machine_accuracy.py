@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from pkmcal import screw
-from pkmcal.arrays import FloatArray, propagate
+from pkmcal.arrays import FloatArray, propagate, rms
 from pkmcal.fitted.fit import Fit
 from pkmcal.kinematics.calibratable import as_given, as_machine
 
@@ -41,6 +41,29 @@ def machine_accuracy(fit: Fit, places: FloatArray, reference: FloatArray) -> Flo
     undetermined = (fit.undetermined() * fit.parameters.scale[:, None])[own]
     moved = np.linalg.norm(alone @ undetermined, axis=(1, 2))
     return np.where(moved < UNDETERMINED, np.sqrt(variance), np.inf)
+
+
+def times_stated(fit: Fit, changes: FloatArray) -> float:
+    """How far changes of the parameters move the machine, over how well it is stated to be known.
+
+    Rms over the measured poses, but for motions of its frames; NaN where it is not known.
+
+    Parameters
+    ----------
+    fit : Fit
+        The fit.
+    changes : ndarray (n, k)
+        Of the parameters, mm and rad, by k errors that have nothing to do with each other.
+    """
+    end = fit.end
+    known = np.isfinite(end.pose).all(axis=1)
+    if not known.any():
+        return float("nan")
+    places = fit.parameters.robot.as_commands(end.pose, end.actuators)[known]
+    off = machine_rates(fit, places, places) @ changes[fit.parameters.geometry_of()]
+    stated = rms(machine_accuracy(fit, places, places))
+    usual = np.isfinite(stated) and stated > 0.0
+    return float(np.sqrt(np.square(off).sum() / len(off)) / stated) if usual else float("nan")
 
 
 def machine_rates(fit: Fit, places: FloatArray, reference: FloatArray) -> FloatArray:

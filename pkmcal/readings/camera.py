@@ -44,7 +44,7 @@ from pkmcal.readings.lens_files import read_lens, write_lens
 from pkmcal.readings.measured import InFit, Measured
 from pkmcal.readings.pictures import Picture, of_pictures_that_are_fitted, pictures
 from pkmcal.readings.predicted import At, Lots, Predicted, Shared
-from pkmcal.readings.reading import HeldNumbers, Reading, Sets, Solve
+from pkmcal.readings.reading import HeldNumbers, Reading, Sets, ShownPoints, Solve
 from pkmcal.readings.seen_places import places_of_markers, tool_places
 from pkmcal.readings.sight import visible
 from pkmcal.readings.unknowns import PLACE, Dependence, Nature, Numbers, Start
@@ -299,6 +299,12 @@ class Camera(Reading):
     def frame_name(self) -> str:
         """The name of what stands."""
         return self.camera_name if self.on == "base" else self.board_name
+
+    @property
+    def shown_points(self) -> ShownPoints:
+        """The corners."""
+        places = np.asarray(self.corner, dtype=np.float64)
+        return ShownPoints(places, self.on == "platform", "corners of the board")
 
     @property
     def stands_by(self) -> str:

@@ -91,6 +91,24 @@ class StatedBeside(NamedTuple):
     places: Sequence[tuple[int, int]]
 
 
+class ShownPoints(NamedTuple):
+    """Points that readings show, each of them in several.
+
+    Attributes
+    ----------
+    places : ndarray (3,) or (N, 3)
+        The point of each row where it is stated, mm.
+    on_frame : bool
+        Whether they stand with the frame; else they are on the platform.
+    noun : str
+        What they are.
+    """
+
+    places: FloatArray
+    on_frame: bool
+    noun: str
+
+
 class Reading:
     """A kind of reading. A subclass is a frozen dataclass; its fields are the instrument's own.
 
@@ -190,6 +208,11 @@ class Reading:
     own_points: ClassVar[tuple[str, ...]] = ()
     truth: ClassVar[tuple[str, ...]] = ()
     stated: ClassVar[tuple[str, ...]] = ()
+
+    @property
+    def shown_points(self) -> ShownPoints | None:
+        """Points that are stated and that several rows show; None of readings without them."""
+        return None
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()

@@ -84,12 +84,12 @@ def _forward(
             break
         best = min(known, key=lambda k: (known[k].chance, -known[k].drop))
         score, taken = known[best], left[best]
-        after = taken_along(taken, score)
+        after = taken_along(taken)
         tested = {k: beside(after, each.columns) for k, each in left.items() if k != best}
         spent = [k for k in known if k != best and _sure(tested[k], limit) is None]
         also = [
             k for k in spent
-            if _sure(beside(taken_along(left[k], known[k]), taken.columns), limit) is None
+            if _sure(beside(taken_along(left[k]), taken.columns), limit) is None
         ]  # fmt: skip
         found.append(
             Explained(
@@ -117,11 +117,11 @@ def _explained_by_others(
             score = None if alone is None else alone.score()
             if alone is None or score is None:
                 break
-            alone = beside(taken_along(alone, score), left[other].columns)
+            alone = beside(taken_along(alone), left[other].columns)
         score = None if alone is None else alone.score()
         if alone is None or score is None:
             continue
-        if _sure(beside(taken_along(alone, score), left[each.cause].columns), limit) is None:
+        if _sure(beside(taken_along(alone), left[each.cause].columns), limit) is None:
             return each.cause
     return None
 
@@ -143,13 +143,13 @@ def _sure(tested: Beside | None, limit: float) -> Score | None:
     return score if score is not None and score.chance < limit else None
 
 
-def taken_along(taken: Beside, score: Score) -> LinearFit:
+def taken_along(taken: Beside) -> LinearFit:
     """The fit with the columns of a cause among its parameters."""
     fit, turned = taken.fit, taken.by_basis @ taken.half
     return replace(
         fit,
         design=np.hstack([fit.design, taken.own]),
-        residual=fit.residual - score.explained,
+        residual=fit.residual - taken.own @ taken.along,
         prior=np.hstack([fit.prior, -fit.prior @ turned]),
         back=np.hstack([fit.back, -fit.back @ turned]),
     )

@@ -1,0 +1,146 @@
+"""Check whether points that several readings show are where they are stated: corners of a board.
+
+A corner that a printer put elsewhere is off alike in all pictures. A fit takes that for noise, of
+which more pictures leave less and less, and states the machine better than it is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.diagnostics.cause_columns import of_instruments_alone
+from pkmcal.diagnostics.check import RARE, Check, Level, at_most_one
+from pkmcal.diagnostics.columns import Change, of_rows
+from pkmcal.display import chance_text
+from pkmcal.fitted.fit import Fit
+from pkmcal.fitted.machine_accuracy import times_stated
+from pkmcal.fitted.solution import Solution
+from pkmcal.readings.predicted import Predicted
+from pkmcal.statistics.causes import taken_along
+from pkmcal.statistics.linear_fit import LinearFit
+from pkmcal.statistics.score_test import Beside, beside
+
+HARMFUL = 0.5  # times its ± by which such errors move a machine
+_READINGS = 4  # of a point, from which its own error is told from noise
+_MOST = 400  # points that are tested
+
+
+@dataclass(frozen=True)
+class StatedPoints:
+    """Points that are not where they are stated.
+
+    Attributes
+    ----------
+    noun : str
+        What they are.
+    count : int
+        How many were tested.
+    chance : float
+        How likely they would seem as far off if all were where they are stated.
+    off : float
+        Estimated standard deviation of a coordinate, mm.
+    shift : float
+        How far such errors move the machine, over how well it is stated to be known.
+    """
+
+    noun: str
+    count: int
+    chance: float
+    off: float
+    shift: float
+
+
+def stated_points(found: Solution) -> StatedPoints | None:
+    """Test the points of all sets; None where none are stated, or too little is left to tell."""
+    fit = found.fit
+    if fit.uncertainty.rounded or not fit.uncertainty.known:
+        return None
+    which, noun, count = _points(fit)
+    if not count:
+        return None
+    linear, columns = _beside_instruments(found), of_rows(fit, _moved(fit, which, count))
+    taken = beside(linear, found.weighed.columns(columns))
+    if taken is None or taken.chance >= RARE:
+        return None
+    off = _deviation(taken)
+    moved = fit.parameters.scale[:, None] * linear.back @ taken.by_basis
+    return StatedPoints(noun, count, taken.chance, off, off * times_stated(fit, moved))
+
+
+def _beside_instruments(found: Solution) -> LinearFit:
+    """The fit with numbers of the instruments, such as a lens, which move many points alike."""
+    linear = found.weighed.fit
+    for _, columns in of_instruments_alone(found):
+        taken = beside(linear, found.weighed.columns(columns))
+        linear = linear if taken is None else taken_along(taken)
+    return linear
+
+
+def _points(fit: Fit) -> tuple[dict[int, IntArray], str, int]:
+    """Which point each row of a set shows, -1 where none that several do; what and how many."""
+    which, noun, before = dict[int, IntArray](), "", 0
+    for i, m in enumerate(fit.uncertainty.equations.table.sets):
+        points = m.instrument.shown_points
+        if points is None:
+            continue
+        places = np.broadcast_to(points.places, (len(m), 3))
+        own, counts = np.unique(places, axis=0, return_inverse=True, return_counts=True)[1:]
+        often = np.flatnonzero(counts >= _READINGS)[: _MOST - before]
+        number = np.full(len(counts), -1)
+        number[often] = before + np.arange(len(often))
+        which[i], noun, before = number[own.reshape(-1)], points.noun, before + len(often)
+    return which, noun, before
+
+
+def _moved(fit: Fit, which: dict[int, IntArray], count: int) -> Change:
+    """Changes of what is read where each point is elsewhere, along three axes."""
+    prediction = fit.uncertainty.equations.prediction
+
+    def change(i: int, rows: slice, seen: Predicted) -> FloatArray:
+        readings, components = seen.values.shape
+        found = np.zeros((readings, components, count, 3))
+        points = prediction.table.sets[i].instrument.shown_points
+        if i in which and points is not None:
+            by = seen.by_frame if points.on_frame else seen.by.get(prediction.carried[i])
+            at = np.flatnonzero(which[i][rows] >= 0)
+            if by is not None:
+                found[at, :, which[i][rows][at]] = by[at, :, :3]
+        return found.reshape(readings, components, 3 * count)
+
+    return change
+
+
+def _deviation(taken: Beside) -> float:
+    """Estimate the deviation of a coordinate by what the columns explain beyond noise, mm."""
+    fit, k = taken.fit, len(taken.along)
+    noise = max(fit.squares - taken.drop, 0.0) / max(fit.freedom - k, 1.0)
+    inverse = taken.half @ taken.half.T
+    told = np.linalg.eigvalsh(inverse)
+    whole = float((1.0 / told[-k:]).sum())
+    return float(np.sqrt(max(taken.drop - k * noise, 0.0) / whole))
+
+
+def _level(found: Solution, seen: StatedPoints) -> Level:
+    return "doubt" if seen.shift > HARMFUL else "remark"
+
+
+def _say(found: Solution, seen: StatedPoints) -> str:
+    return (
+        f"{seen.noun} are not where they are stated ({chance_text(seen.chance)}): each is some"
+        f" {seen.off:.2g} mm off along an axis, alike in all readings, which puts the machine off"
+        f" by {seen.shift:.2g} times its ±; measure where they are and state that, or take a"
+        " better one"
+    )
+
+
+CHECKS = (
+    Check(
+        name="stated-points", about="corners of a board are not where they are stated",
+        levels=("doubt", "remark"), level_of=_level,
+        unless=("grave",),
+        run=lambda found: at_most_one(stated_points(found)), say=_say,
+    ),
+)  # fmt: skip

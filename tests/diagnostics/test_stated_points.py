@@ -1,0 +1,74 @@
+"""Corners of a board that are not where they are stated: alike in all pictures, and no noise."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import pkmcal as pk
+from pkmcal.diagnostics.stated_points import StatedPoints
+
+from .test_pictures import BOARD, checks, pictures, with_lens
+
+MM = 0.05
+
+
+@pytest.fixture(scope="module")
+def sound() -> pk.Measurements:
+    return pictures()
+
+
+def elsewhere(measured: pk.Measurements, off: np.ndarray) -> pk.Measurements:
+    """The same pictures, of a board whose corners (K, 3) are stated to be off by some mm."""
+    corner = np.asarray(measured.instrument.corner)
+    which = np.argmin(np.linalg.norm(corner[:, None] - BOARD.places[None], axis=2), axis=1)
+    return with_lens(measured, corner=corner + off[which])  # type: ignore[arg-type]
+
+
+def drawn(seed: int) -> np.ndarray:
+    off = np.random.default_rng(seed).normal(0.0, MM, BOARD.places.shape)
+    off[:, 2] = 0.0
+    return off
+
+
+@pytest.mark.parametrize("on", ["base", "platform"])
+def test_corners_that_are_off_alike_in_all_pictures_are_doubted_with_their_size(
+    sound: pk.Measurements, on: str
+) -> None:
+    """Of those that lie flat two of three coordinates are off."""
+    measured = sound if on == "base" else riding()
+    found, said = checks(elsewhere(measured, drawn(1)))
+    (own,) = (each for each in found.verdict.said if each.check == "stated-points")
+    assert isinstance(own.finding, StatedPoints) and own.finding.count == len(BOARD.ids)
+    assert own.finding.off == pytest.approx(MM, rel=0.35)
+    assert own.level == "doubt" and found.verdict.state == "doubtful"
+    assert "corners of the board are not where they are stated" in said["stated-points"]
+
+
+def riding() -> pk.Measurements:
+    """A camera on a platform looks up at a board that stands."""
+    robot = pk.load("hexapod")
+    camera = pk.readings.Camera(
+        on="platform", fx=1500.0, fy=1505.0, cx=640.0, cy=400.0, width=1280, height=800,
+        stands=[87, 70, -float(robot.home[2]) - 700.0, 0, 0, 0],
+    )  # fmt: skip
+    poses = pk.sample_poses(robot, 24, seed=1, share=0.25)
+    at, seeing = camera.seeing(robot.inverse(poses), BOARD)
+    return pk.VirtualMachine(robot, 0.1, 5).measure(at, seeing)
+
+
+@pytest.mark.parametrize("seed", [3, 5])
+def test_sound_corners_are_not_doubted(sound: pk.Measurements, seed: int) -> None:
+    noise = np.random.default_rng(seed).normal(0.0, 0.1, sound.values.shape)
+    found, said = checks(replace(sound, values=sound.values + noise))
+    assert "stated-points" not in said and found.verdict.state == "calibrated"
+
+
+@pytest.mark.parametrize("lens", [{"fx": 1530.0, "fy": 1535.0}, {"cx": 655.0}])
+def test_a_lens_that_is_off_is_no_board_that_is(
+    sound: pk.Measurements, lens: dict[str, float]
+) -> None:
+    """It moves corners alike in all pictures, too, as far as they are in one place of these."""
+    assert "stated-points" not in checks(with_lens(sound, **lens))[1]
