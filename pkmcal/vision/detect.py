@@ -22,6 +22,7 @@ from pkmcal.vision.detectors import NOTHING, Finder, family_of, finder, opencv
 from pkmcal.vision.pictures import (
     FEWEST,
     Picture,
+    brightness,
     files,
     grey,
     looked_at,
@@ -32,6 +33,7 @@ from pkmcal.vision.pictures import (
 from pkmcal.vision.sheet import Panel, draw
 
 _EDGE = 1 / 8  # of a picture, in which corners tell the distortion
+_DARK = 1 / 8  # of the range of a picture, beyond which one that was exposed well has levels
 _TILTED = np.radians(5.0)  # between pictures, of a board that is tilted enough to tell the lens
 
 
@@ -228,6 +230,8 @@ def _remarks(found: Detection, board: Board, tilts: FloatArray, finds: Finder) -
                 f"markers of {family} are found, but no board of {board.shape[0]}x{board.shape[1]}"
                 f" with {board.dictionary}: state the {asked} that was printed"
             )
+        elif dark := _dark(found.pictures):
+            yield dark
         return
     pixel, size = found.pixel, np.array(found.taken[0].size)
     hulls = [_area(each.seen.pixel) for each in found.taken]
@@ -279,6 +283,24 @@ def _family(pictures: Sequence[Picture]) -> str:
     for each in pictures:
         if each.bad.startswith("no board"):
             return family_of(grey(each.path, each.path.read_bytes()))
+    return ""
+
+
+def _dark(pictures: Sequence[Picture]) -> str:
+    """Say that the first picture that shows no board is dark; "" where it is not."""
+    for each in pictures:
+        if each.bad.startswith("no board"):
+            largest, most = brightness(each.path, each.path.read_bytes())
+            if largest >= _DARK * most:
+                return ""
+            why = (
+                "pictures of 10 or 12 bits in files of 16 have to be stretched to the whole range"
+                if most > 255
+                else "expose them longer"
+            )
+            return (
+                f"{printable(each.path.name)} is dark, with levels up to {largest} of {most}: {why}"
+            )
     return ""
 
 

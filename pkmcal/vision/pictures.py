@@ -82,9 +82,27 @@ def _natural(name: str) -> list[tuple[bool, int, str]]:
 
 
 def grey(path: Path, content: bytes) -> Any:
-    """Grey levels of a picture."""
+    """Grey levels of a picture, 0 to 255."""
+    return _decoded(path, content, opencv().IMREAD_GRAYSCALE)
+
+
+def brightness(path: Path, content: bytes) -> tuple[int, int]:
+    """The largest number in a picture, and the largest that its kind of numbers can have."""
     cv2 = opencv()
-    image = cv2.imdecode(np.frombuffer(content, dtype=np.uint8), cv2.IMREAD_GRAYSCALE)
+    levels = _decoded(path, content, cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH)
+    most = int(np.iinfo(levels.dtype).max) if levels.dtype.kind in "iu" else 1
+    return int(levels.max()), most
+
+
+def _decoded(path: Path, content: bytes, how: int) -> Any:
+    """Numbers of a picture; OpenCV returns nothing of some bad files and raises at others."""
+    if not content:
+        raise FileError(f"{path}: this file is empty, no picture; take the picture again")
+    cv2 = opencv()
+    try:
+        image = cv2.imdecode(np.frombuffer(content, dtype=np.uint8), how)
+    except cv2.error as error:
+        raise FileError(f"{path}: this is no picture that can be read: {error.err}") from None
     if image is None:
         raise FileError(f"{path}: this is no picture that can be read")
     return image

@@ -272,6 +272,28 @@ def test_a_folder_becomes_a_file_and_a_picture(
     assert "text.png" in refused("detect", tmp_path / "text.png", "--board", CHARUCO)
 
 
+def test_a_file_without_a_byte_is_named_as_no_picture(
+    refused: Callable[..., str], tmp_path: Path
+) -> None:
+    (tmp_path / "nothing.png").write_bytes(b"")
+    assert "nothing.png: this file is empty" in refused("detect", tmp_path, "--board", CHARUCO)
+
+
+def test_dark_pictures_that_show_nothing_are_said_to_be_dark(
+    tmp_path: Path, charuco: tuple[Path, np.ndarray]
+) -> None:
+    """Levels of 12 bits in a file of 16 are black for who reads the upper eight."""
+    file = tmp_path / "0.png"
+    levels = cv2.imread(str(charuco[0] / "0.png"), cv2.IMREAD_GRAYSCALE).astype(np.uint16)
+    cv2.imwrite(str(file), levels // 16)
+    board = Board.parse(CHARUCO)
+    found = pk.detect(file, board)
+    most = levels.max() // 16
+    assert not found.taken and f"0.png is dark, with levels up to {most} of 65535" in str(found)
+    cv2.imwrite(str(file), np.full_like(levels, 30000))
+    assert "dark" not in str(pk.detect(file, board))
+
+
 def test_without_opencv_the_extra_is_named(
     monkeypatch: pytest.MonkeyPatch, refused: Callable[..., str], charuco: tuple[Path, Any]
 ) -> None:
