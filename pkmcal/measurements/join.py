@@ -10,9 +10,10 @@ import numpy as np
 
 from pkmcal.arguments import word
 from pkmcal.arrays import IntArray
+from pkmcal.display import printable
 from pkmcal.exceptions import FileError
 from pkmcal.files.column_names import BESIDE
-from pkmcal.files.csv_table import Table
+from pkmcal.files.csv_table import Column, Table
 from pkmcal.measurements.actuator_columns import actuators_in
 from pkmcal.measurements.field import Field
 from pkmcal.measurements.table_layout import split
@@ -198,9 +199,28 @@ def _by_name(table: Table, log: Table) -> tuple[Rows, str] | str:
                     best = count, rows, said
     if best is not None and best[0] >= _ENOUGH * len(table):
         return best[1], best[2]
+    for cells in mine.values():
+        for column in theirs.values():
+            if twice := _twice(cells, column):
+                return twice
     some = next(iter(mine.values()))[0]
     other = next(iter(theirs.values())).cells[0]
     return f"names such as {some!r} and {other!r} are not the same"
+
+
+def _twice(names: Sequence[str], column: Column) -> str:
+    """Say that a log has two rows of one name, where its names are those of the points."""
+    keys = [_key(each, loose=False) for each in column.cells]
+    if sum(_key(each, loose=False) in keys for each in names) < _ENOUGH * len(names):
+        return ""
+    first: dict[str, int] = {}
+    for row, key in enumerate(keys):
+        if key and (before := first.setdefault(key, row)) != row:
+            return (
+                f"{column.place}, lines {column.lines[before]} and {column.lines[row]} are both"
+                f" called {printable(column.cells[row])!r}: leave one of them out"
+            )
+    return ""
 
 
 def _found(names: Sequence[str], logged: Sequence[str], loose: bool) -> Rows | None:

@@ -320,6 +320,15 @@ def test_a_missing_column_names_what_was_not_known(tmp_path: Path) -> None:
         read(tmp_path, "Foo [mm],Bar [mm],z [mm]\n1,2,3\n")
 
 
+def test_a_name_that_a_log_has_twice_is_told_by_its_lines(tmp_path: Path) -> None:
+    points = "Image,z [mm]\n" + "".join(f"{i}.png,{i}\n" for i in (1, 1, 2, 3))
+    log = "Image,q1 [mm]\n" + "".join(f"{i}.png,{i}\n" for i in (1, 2, 3, 2, 4))
+    with pytest.raises(pk.FileError, match=r"lines 3 and 5 are both called '2\.png'"):
+        two(tmp_path, points, log)
+    with pytest.raises(pk.FileError, match=r"names such as '1\.png' and 'A1' are not the same"):
+        two(tmp_path, points, "Image,q1 [mm]\nA1,1\nA1,2\n")
+
+
 def test_poses_from_one_and_rows_from_zero_are_not_joined_by_number(tmp_path: Path) -> None:
     """By number all but the last would be shifted by one; the order of the poses is right."""
     points = "Point,z [mm]\n" + "".join(f"P{i},{i}\n" for i in (1, 2, 3))
