@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal.arguments import flag, number, shown
-from pkmcal.arrays import FloatArray, Int64Array, IntArray
+from pkmcal.arrays import BoolArray, FloatArray, Int64Array, IntArray
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.csv_table import Table
 from pkmcal.readings import rows
@@ -245,19 +245,24 @@ class Board:
         ways: FloatArray = away / np.linalg.norm(away, axis=1, keepdims=True)
         return ways[self._entries(ids)]
 
+    def strange(self, ids: ArrayLike) -> BoolArray:
+        """Which numbers of corners (N,) the board does not have."""
+        return np.asarray(~np.isin(np.atleast_1d(ids), self.ids))
+
+    @property
+    def counted(self) -> str:
+        """How many corners it has, and their numbers, as messages say it."""
+        return f"the board has {len(self.ids)} corners, {self.ids.min()} to {self.ids.max()}"
+
     def _entries(self, ids: ArrayLike) -> IntArray:
         """Return where corners (N,) stand among `ids`."""
         asked = np.atleast_1d(ids)
         order = np.argsort(self.ids)
         place = np.minimum(np.searchsorted(self.ids, asked, sorter=order), len(order) - 1)
-        found = order[place]
-        wrong = self.ids[found] != asked
+        wrong = self.strange(asked)
         if wrong.any():
-            raise ArgumentError(
-                f"corner: the board has {len(self.ids)} corners, {self.ids.min()} to"
-                f" {self.ids.max()}; found {asked[wrong][0]}"
-            )
-        return found
+            raise ArgumentError(f"corner: {self.counted}; found {asked[wrong][0]}")
+        return order[place]
 
 
 def _board(

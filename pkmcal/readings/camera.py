@@ -620,8 +620,13 @@ class Camera(Reading):
                 "column 'corner': state the board and the lens of the camera, as --camera FILE"
                 " --board BOARD (kind=pkmcal.readings.Camera(board=Board.parse(...), ...))"
             )
-        try:
-            return self._before(self.board, table.integers("corner")).with_fields({"board": None})
-        except ArgumentError as error:
-            hint = "state the board that was printed, its columns before its rows"
-            raise table.header_error(f"column {error}; {hint}") from None
+        ids = table.integers("corner")
+        wrong = np.flatnonzero(self.board.strange(ids))
+        if len(wrong):
+            raise table.cell_error(
+                "corner",
+                int(wrong[0]),
+                f"{self.board.counted}; found {ids[wrong[0]]}: state the board that was printed,"
+                " its columns before its rows",
+            )
+        return self._before(self.board, ids).with_fields({"board": None})

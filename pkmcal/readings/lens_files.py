@@ -43,6 +43,7 @@ _DATA = ("data", "matrix", "")  # where numbers of a matrix are; "": in the line
 _APART = 1e-6  # of two focal lengths in proportion, by which they differ nevertheless
 _NAMES = ("k1", "k2", "p1", "p2", "k3")
 _ENTRY = re.compile(r"^(?P<indent> *)(?:- )?(?P<name>[A-Za-z_][\w. -]*?) *: *(?P<rest>.*)$")
+_NAMED = re.compile(r"(?:^|[{,]) *\"?([A-Za-z_][\w.-]*)\"? *:")  # of YAML and JSON
 _NUMBER = re.compile(r"[-+]?(?:\.?(?:nan|inf)\b|(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)", re.IGNORECASE)
 _NOTHING = ("", "None", "null", "~")
 
@@ -68,48 +69,54 @@ def read_lens(path: str | PathLike[str]) -> dict[str, Any]:
     try:
         found = json.loads(text) if text.lstrip().startswith("{") else _entries(text)
     except json.JSONDecodeError as error:
-        raise FileError(f"{file}: line {error.lineno}: no JSON: {error.msg}") from None
+        raise FileError(f"{file}, line {error.lineno}: no JSON: {error.msg}") from None
     if not isinstance(found, Mapping):
         raise FileError(f"{file}: expected a camera matrix and its names, found a list")
     known = {str(name).lower().strip(): value for name, value in found.items()}
+    where = _Where(file, text)
     model = str(_first(known, _MODEL) or "").strip("\"' ")
     if model.lower() not in _PLAIN:
         raise FileError(
-            f"{file}: distortion model {model!r}: only the numbers k1 k2 p1 p2 k3 of OpenCV are"
+            f"{where(*_MODEL)}:"
+            f" distortion model {model!r}: only the numbers k1 k2 p1 p2 k3 of OpenCV are"
             " supported; rectify the images and state the lens of the rectified ones"
         )
     if any(_numbers(known.get(_FISHEYE))):
         raise FileError(
-            f"{file}: the lens is a fisheye, which the numbers k1 k2 p1 p2 k3 of OpenCV do not"
+            f"{where(_FISHEYE)}:"
+            f" the lens is a fisheye, which the numbers k1 k2 p1 p2 k3 of OpenCV do not"
             " describe; rectify the images and state the lens of the rectified ones"
         )
     if "m1" in known and "m2" in known:
         raise FileError(
-            f"{file}: M1 and M2: two cameras; write a file for each, with camera_matrix and"
+            f"{where('m2')}: M1 and M2: two cameras; write a file for each, with camera_matrix and"
             " distortion_coefficients"
         )
-    matrix = _list(known, _MATRIX, str(file))
+    matrix = _list(known, _MATRIX, where)
     if len(matrix) != 9:
         raise FileError(
-            f"{file}: expected a camera matrix of 9 numbers under {', '.join(_MATRIX[:3])}; found"
+            f"{where(*_MATRIX)}:"
+            f" expected a camera matrix of 9 numbers under {', '.join(_MATRIX[:3])}; found"
             f" {len(matrix)} of {', '.join(map(str, found)) or 'nothing'}"
         )
     if matrix[0] <= 0 or matrix[4] <= 0 or abs(matrix[1]) > 1e-9 * matrix[0]:
         raise FileError(
-            f"{file}: the camera matrix must have focal lengths above 0 and no skew; found"
+            f"{where(*_MATRIX)}:"
+            f" the camera matrix must have focal lengths above 0 and no skew; found"
             f" {matrix[0]:g}, {matrix[4]:g} and {matrix[1]:g}"
         )
     if not any(matrix[i] for i in (2, 5)) and any(matrix[6:8]):  # column by column: Open3D
         matrix = np.reshape(matrix, (3, 3)).T.ravel().tolist()
     if matrix[6:] != [0.0, 0.0, 1.0]:
         raise FileError(
-            f"{file}: the last row of the camera matrix must be 0, 0, 1; found"
+            f"{where(*_MATRIX)}: the last row of the camera matrix must be 0, 0, 1; found"
             f" {', '.join(f'{each:g}' for each in matrix[6:])}"
         )
-    bent = _distortion(known, str(file))
+    bent = _distortion(known, where)
     if np.any(np.asarray(bent[5:]) != 0.0):
         raise FileError(
-            f"{file}: {len(bent)} distortion coefficients (rational, thin prism or tilted): only k1"
+            f"{where(*_BENT)}:"
+            f" {len(bent)} distortion coefficients (rational, thin prism or tilted): only k1"
             " k2 p1 p2 k3 are supported; calibrate with these, or rectify the images"
         )
     lens: dict[str, Any] = dict(
@@ -117,10 +124,25 @@ def read_lens(path: str | PathLike[str]) -> dict[str, Any]:
     )
     lens |= dict(zip(_NAMES, bent, strict=False))
     lens |= _size(known)
-    sigma = _sigma(known, str(file))
+    sigma = _sigma(known, where)
     if sigma is not None:
         lens["lens_sigma"] = sigma
-    return _of_a_part(lens, known, str(file))
+    return _of_a_part(lens, known, where)
+
+
+class _Where:
+    """The file of a lens and the line of a name in it, as messages begin."""
+
+    def __init__(self, file: Path, text: str) -> None:
+        self._file, self._lines = file, dict[str, int]()
+        for number, line in enumerate(text.splitlines(), 1):
+            for name in _NAMED.findall(line):
+                self._lines.setdefault(name.lower(), number)
+
+    def __call__(self, *names: str) -> str:
+        """The line of the first of these names that the file has; the file alone without one."""
+        line = next((self._lines[each] for each in names if each in self._lines), None)
+        return f"{self._file}" if line is None else f"{self._file}, line {line}"
 
 
 def _size(known: Mapping[str, Any]) -> dict[str, int]:
@@ -135,7 +157,7 @@ def _size(known: Mapping[str, Any]) -> dict[str, int]:
     return found
 
 
-def _of_a_part(lens: dict[str, Any], known: Mapping[str, Any], file: str) -> dict[str, Any]:
+def _of_a_part(lens: dict[str, Any], known: Mapping[str, Any], where: _Where) -> dict[str, Any]:
     """The lens of pictures of a part of the sensor, or with pixels put together, as ROS has them.
 
     Matrix, width and height of ``camera_info`` are those of the whole sensor, pixel by pixel. The
@@ -146,16 +168,17 @@ def _of_a_part(lens: dict[str, Any], known: Mapping[str, Any], file: str) -> dic
         roi = dict(each.partition(":")[::2] for each in inside.strip("{} ").split(","))
         roi = {name.strip(): value.strip() for name, value in roi.items()}
     if roi not in (None, *_NOTHING) and not isinstance(roi, Mapping):
-        raise FileError(f"{file}: roi: expected {', '.join(_ROI)}; found {str(roi)[:60]}")
-    part = [_whole(roi, name, f"{file}: roi: ") for name in _ROI]
-    binning = [_whole(known, name, f"{file}: ") or 1 for name in _BINNING]
+        raise FileError(f"{where('roi')}: roi: expected {', '.join(_ROI)}; found {str(roi)[:60]}")
+    part = [_whole(roi, name, f"{where('roi')}: roi: ") for name in _ROI]
+    binning = [_whole(known, name, f"{where(name)}: ") or 1 for name in _BINNING]
     covariance = np.eye(9)
     for i, (focal, middle, side) in enumerate((("fx", "cx", "width"), ("fy", "cy", "height"))):
         first, count, together = part[i], part[2 + i], binning[i]
         end = lens.get(side, 0)
         if end and first + count > end:
             raise FileError(
-                f"{file}: roi: pixels {first} to {first + count} are not within {side} {end}"
+                f"{where('roi')}:"
+                f" roi: pixels {first} to {first + count} are not within {side} {end}"
             )
         lens[focal] /= together
         lens[middle] = (lens[middle] - first) / together + 0.5 * (1.0 / together - 1.0)
@@ -183,18 +206,19 @@ def _whole(known: Any, name: str, where: str) -> int:
     return int(found)
 
 
-def _distortion(known: Mapping[str, Any], file: str) -> list[float]:
+def _distortion(known: Mapping[str, Any], where: _Where) -> list[float]:
     """Numbers of the distortion; none is stated only where nothing is called so."""
     words = (*_BENT, *_MODEL, *(name for name, _ in _SIGMA_OF_PARTS))
     strange = [name for name in known if name.startswith("dist") and name not in words]
     if strange and not any(name in known for name in _BENT):
         raise FileError(
-            f"{file}: {strange[0]}: distortion is read under {', '.join(_BENT[:3])}; rename it"
+            f"{where(strange[0])}:"
+            f" {strange[0]}: distortion is read under {', '.join(_BENT[:3])}; rename it"
         )
-    return _list(known, _BENT, file)
+    return _list(known, _BENT, where)
 
 
-def _list(known: Mapping[str, Any], names: tuple[str, ...], file: str) -> list[float]:
+def _list(known: Mapping[str, Any], names: tuple[str, ...], where: _Where) -> list[float]:
     """Return numbers under the first of several names, which must be numbers and no more."""
     name = next((each for each in names if each in known), "")
     value = known.get(name)
@@ -203,33 +227,40 @@ def _list(known: Mapping[str, Any], names: tuple[str, ...], file: str) -> list[f
     found = _numbers(value)
     if (value and inner is None) or rest not in _NOTHING or not np.isfinite(found).all():
         raise FileError(
-            f"{file}: {name}: expected a list of finite numbers; found {str(value)[:60]}"
+            f"{where(name)}: {name}: expected a list of finite numbers; found {str(value)[:60]}"
         )
     return found
 
 
-def _sigma(known: Mapping[str, Any], file: str) -> FloatArray | None:
+def _sigma(known: Mapping[str, Any], where: _Where) -> FloatArray | None:
     """Uncertainty of the nine numbers: a covariance (9, 9); None where none is stated.
 
     A focal length that was held in proportion to the other is wrong by as much as that.
     """
     if _COVARIANCE in known:
-        found = np.array(_list(known, (_COVARIANCE,), file))
+        found = np.array(_list(known, (_COVARIANCE,), where))
         if found.size != 81:
-            raise FileError(f"{file}: {_COVARIANCE} has {found.size} numbers, 9 x 9 are needed")
+            raise FileError(
+                f"{where(_COVARIANCE)}: {_COVARIANCE} has {found.size} numbers, 9 x 9 are needed"
+            )
         return found.reshape(9, 9)
-    stated = _list(known, _SIGMA, file)
+    stated = _list(known, _SIGMA, where)
     if not stated:
-        parts = [_list(known, (name,), file) for name, _ in _SIGMA_OF_PARTS]
+        parts = [_list(known, (name,), where) for name, _ in _SIGMA_OF_PARTS]
         if not any(parts):
             return None
         for (name, count), part in zip(_SIGMA_OF_PARTS, parts, strict=True):
             if len(part) != count:
-                raise FileError(f"{file}: {name} has {len(part)} numbers, {count} are needed")
+                raise FileError(
+                    f"{where(name)}: {name} has {len(part)} numbers, {count} are needed"
+                )
         stated = [number for part in parts for number in part]
     sigma = np.array([*stated, *[0.0] * 9][:9])
     if (sigma < 0.0).any():
-        raise FileError(f"{file}: standard deviations of a lens must be 0 or above")
+        raise FileError(
+            f"{where(*_SIGMA, *dict(_SIGMA_OF_PARTS))}:"
+            f" standard deviations of a lens must be 0 or above"
+        )
     covariance = np.diag(sigma**2)
     if (sigma[0] == 0.0) != (sigma[1] == 0.0):
         both = float(sigma[:2].max())

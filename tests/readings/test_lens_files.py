@@ -43,6 +43,22 @@ def test_the_distortion_is_read_however_its_list_is_written(tmp_path: Path, text
     assert read(tmp_path, text) == LENS
 
 
+@pytest.mark.parametrize(
+    ("text", "line", "message"),
+    [
+        (f"# a lens\nK: {MATRIX}\nwidth: 9\nD: [0.1, nought]\n", 4, "d: expected a list"),
+        ('{"width": 9,\n\n "K": [1, 0, 2]}', 3, "expected a camera matrix of 9 numbers"),
+        (f"model: x\nK: {MATRIX}\ndistortion_model: equidistant\n", 3, "distortion model"),
+        (f"roi: {{x_offset: -1, y_offset: 2}}\nK: {MATRIX}\n", 1, "roi: x_offset"),
+    ],
+)
+def test_what_is_wrong_in_a_lens_file_has_its_line(
+    tmp_path: Path, text: str, line: int, message: str
+) -> None:
+    with pytest.raises(pk.FileError, match=rf"lens\.yaml, line {line}: {message}"):
+        read(tmp_path, text)
+
+
 def test_a_matrix_written_column_by_column_is_turned(tmp_path: Path) -> None:
     """As Open3D does; taken row by row the middle of the lens would be 0, 0."""
     text = '{"width": 1280, "height": 720, "intrinsic_matrix": [9, 0, 0, 0, 8, 0, 6.4, 3.6, 1]}'
