@@ -212,6 +212,12 @@ def rms(values: FloatArray) -> float:
 
 
 def propagate(jacobian: FloatArray, covariance: FloatArray) -> FloatArray:
-    """Variances trace(J C Jᵀ) (N,) of points whose derivatives J are (N, k, n), for C (n, n)."""
-    variance: FloatArray = np.einsum("nij,jk,nik->n", jacobian, covariance, jacobian, optimize=True)
+    """Variances trace(J C Jᵀ) (N,) of points whose derivatives J are (N, k, n), for C (n, n).
+
+    Not finite where a number is not determined.
+    """
+    with np.errstate(invalid="ignore"):  # of infinite variances
+        variance: FloatArray = np.einsum(
+            "nij,jk,nik->n", jacobian, covariance, jacobian, optimize=True
+        )
     return variance

@@ -34,6 +34,7 @@ _SAME = 1e-4  # turning between two places, rad, below which they are one
 _LINE = 0.01  # square across over along, at which corners of a picture are in a line
 _BY_CHANCE = 1e-9  # that corners seem so much further off at the right place
 _SQUARE = 1e-10  # the same of corners of which a line is told apart to a few digits
+_ROUNDED = 1e-24  # the same of what rounding leaves apart
 _FLAT = 1e-6  # share of a board's size by which its corners may stand off a plane
 
 
@@ -132,13 +133,19 @@ def unbent(pixel: FloatArray, lens: FloatArray) -> FloatArray:
     return found
 
 
-def in_a_line(corner: FloatArray, picture: IntArray, pictures: int) -> BoolArray:
-    """Pictures (P,) of which corners (N, 3) are in a line, or nearly: they tell no turning."""
+def in_a_line(
+    corner: FloatArray, picture: IntArray, pictures: int, thin: float = _LINE
+) -> BoolArray:
+    """Pictures (P,) of which corners (N, 3) are in a line, or nearly: they tell no turning.
+
+    Nearly is by a share `thin` of squares; corners that are apart by rounding are in a point.
+    """
     count = np.maximum(np.bincount(picture, minlength=pictures), 1)
     away = corner - (summed(corner, picture, pictures) / count[:, None])[picture]
     squares = summed(away[:, :, None] * away[:, None, :], picture, pictures)
     size = np.linalg.eigvalsh(squares)
-    return np.asarray(size[:, 1] <= _LINE * size[:, 2])
+    rounded = _ROUNDED * summed(corner**2, picture, pictures).sum(axis=1)
+    return np.asarray(size[:, 1] <= np.maximum(thin * size[:, 2], rounded))
 
 
 def pictures_told(
@@ -147,13 +154,15 @@ def pictures_told(
     """Rows (n,) of pictures that tell where a board is, and which picture each is of (n,).
 
     Of N rows those whose pixel is not NaN count. `picture` (N,) counts from 0; that of what is
-    found does so, too.
+    found does so, too. A picture that has all its corners in a point or a line tells nothing.
     """
     known = np.isfinite(pixel).all(axis=1)
     flat = np.linalg.svd(corner - corner.mean(axis=0), compute_uv=False)
     fewest = FEWEST if flat[-1] <= _FLAT * flat[0] else FEWEST + 2
     enough = np.bincount(picture[known], minlength=int(picture.max()) + 1) >= fewest
     enough &= ~in_a_line(corner[known], picture[known], len(enough))
+    seen = np.column_stack([pixel[known], np.zeros(int(known.sum()))])
+    enough &= ~in_a_line(seen, picture[known], len(enough), _SQUARE)
     used = np.flatnonzero(known & enough[picture])
     return used, np.unique(picture[used], return_inverse=True)[1].reshape(-1)
 
@@ -161,7 +170,8 @@ def pictures_told(
 def mm_per_pixel(corner: FloatArray, pixel: FloatArray, picture: IntArray) -> FloatArray:
     """Return the size of a pixel at the board of each picture, mm, as if from far away (P,).
 
-    NaN where corners (N, 3) of a picture are in a line. `picture` (N,) counts from 0.
+    NaN where corners (N, 3) of a picture are in a line, or seen in one point. `picture` (N,)
+    counts from 0.
     """
     count = np.bincount(picture)
     both = np.hstack([corner, pixel])
@@ -173,7 +183,9 @@ def mm_per_pixel(corner: FloatArray, pixel: FloatArray, picture: IntArray) -> Fl
     image = (axes * share[:, None]) @ axes.transpose(0, 2, 1) @ products[:, :, 3:]
     found = np.full(len(count), np.nan)
     flat = told.sum(axis=1) > 1
-    found[flat] = 1.0 / np.linalg.norm(image[flat], ord=2, axis=(1, 2))
+    pixels = np.linalg.norm(image, ord=2, axis=(1, 2))
+    flat &= pixels > 0.0
+    found[flat] = 1.0 / pixels[flat]
     return found
 
 

@@ -19,7 +19,7 @@ from typing import Any, ClassVar, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pkmcal.arguments import number, word
+from pkmcal.arguments import instance, number, whole, word
 from pkmcal.arrays import FloatArray, IntArray, as_rows, first_of_equal
 from pkmcal.core import instruments, screws
 from pkmcal.core.poses import NOWHERE
@@ -466,9 +466,8 @@ class Camera(Reading):
         """
         used, number = self._pictures_told(m)
         if not len(used):
-            return places_of_markers(
-                self._corners(len(m)), m.values, self.lens_numbers(), self.on == "platform", pose
-            )
+            corner, lens, rides = self._corners(len(m)), self.lens_numbers(), self.on == "platform"
+            return places_of_markers(corner, m.values, lens, rides, pose, self._called(m))
         seen = self._corners(len(m))[used], m.values[used], number
         first = np.unique(number, return_index=True)[1]
         shown = used[first]
@@ -478,6 +477,15 @@ class Camera(Reading):
         found = np.full((len(m), 6), np.nan)
         found[shown] = places
         return found
+
+    def _called(self, m: Measured) -> str:
+        """What messages call these measurements among those of other cameras and boards."""
+        named = {"camera": self.camera_name, "board": self.board_name}
+        which = " and ".join(f"{what} {printable(name)!r}" for what, name in named.items() if name)
+        if not which:
+            return "measurements"
+        count = int(np.isfinite(m.values).all(axis=1).sum())
+        return f"measurements of {which}, {count} row{'s' * (count != 1)}"
 
     def doubts(self, m: Measured) -> Iterator[str]:
         """Pixels outside of pictures, lenses of other pictures, boards seen from behind."""
@@ -530,6 +538,10 @@ class Camera(Reading):
         """Check lens, mounting and corners."""
         word("on", self.on, get_args(Mount))
         word("lens", self.lens, tuple(FOUND))
+        for side in ("width", "height"):
+            whole(side, getattr(self, side), 0)
+        for name in ("camera_name", "board_name"):
+            instance(name, getattr(self, name), str)
         if self.corner is None:
             raise ArgumentError(
                 "corner: pixels need the corner that each row shows: its place on the board, as"

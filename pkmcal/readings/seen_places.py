@@ -113,7 +113,12 @@ def tool_places(
 
 
 def places_of_markers(
-    corner: FloatArray, pixel: FloatArray, lens: FloatArray, rides: bool, pose: FloatArray
+    corner: FloatArray,
+    pixel: FloatArray,
+    lens: FloatArray,
+    rides: bool,
+    pose: FloatArray,
+    called: str = "measurements",
 ) -> FloatArray:
     """Pose (N, 6) of a board of too few corners in the frame of a camera that stands.
 
@@ -132,9 +137,10 @@ def places_of_markers(
     told = pictures_told(about, pixel[seen], together)[0] if len(seen) and not rides else seen[:0]
     if not len(told):
         raise ArgumentError(
-            "measurements: no picture shows four corners of a board that are not in a line, and"
+            f"{called}: no picture shows four corners of a board that are not in a line, and"
             " single markers tell where a camera is only if it stands and sees them at six places"
-            " or more: state the corners of a marker as a board, apriltags:1x1,TAG,GAP"
+            " or more: state the corners of a marker as a board, apriltags:1x1,TAG,GAP, or, where"
+            " other cameras and boards are left, leave these rows out"
         )
     boards = board_poses(about, pixel[seen], lens, together)
     places = np.full((len(pose), 6), np.nan)
