@@ -210,6 +210,8 @@ def read_measurements(
     leave_out_unknown(table, _known(table, several, readings, points), SYNONYMS)
     if not table.columns.keys().isdisjoint(("probe", "contact")):
         return read_probe(table, robot, probe_offset)
+    if probe_offset is not None:
+        table.note("the offset of the probe counts where a column is called probe, and not here")
     actuators, units = read_actuators(table, robot)
     compare(table, units, robot)
     fill_in(table, robot, several)

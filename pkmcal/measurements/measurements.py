@@ -354,6 +354,11 @@ class Measurements(Result):
         """
         pose = self.pose_index
         poses = int(pose.max()) + 1
+        if poses < 2:
+            raise ArgumentError(
+                f"holdout: the {len(self)} rows are of one pose, and stay together: nothing would"
+                " be left to fit; measure more poses, or hold none out"
+            )
         fraction = isinstance(holdout, float) and 0 < holdout < 1
         count = max(1, round(holdout * poses)) if fraction else holdout
         whole = isinstance(count, (int, np.integer)) and not isinstance(count, bool)

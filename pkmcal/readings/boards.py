@@ -16,6 +16,7 @@ from pkmcal.exceptions import ArgumentError
 from pkmcal.files.csv_table import Table
 from pkmcal.readings import rows
 
+_MOST = 100_000  # squares, tags or dots of a board, more than any picture tells apart
 Print = Literal["chessboard", "charuco", "apriltags", "circles", "points"]
 _FORMS = (
     "chessboard:COLUMNSxROWS,SQUARE of inner corners",
@@ -190,20 +191,22 @@ class Board:
         try:
             columns, rows_ = (int(each) for each in size.lower().split("x"))
             if kind in ("chessboard", "circles"):
-                (pitch,) = (float(each) for each in others)
-                make = Board.chessboard if kind == "chessboard" else Board.circles
-                return make(columns, rows_, pitch)
-            legacy = kind == "charuco" and others[3:] == ["legacy"]
-            first, second, dictionary = others[:3] if legacy else others
-            lengths = float(first), float(second)
-            if kind not in ("charuco", "apriltags"):
+                (first,), second, dictionary, legacy = others, "0", "", False
+            else:
+                legacy = kind == "charuco" and others[3:] == ["legacy"]
+                first, second, dictionary = others[:3] if legacy else others
+            length, inner = float(first), float(second)
+            if kind not in ("chessboard", "circles", "charuco", "apriltags"):
                 raise ValueError(kind)
         except ValueError:
             forms = "; ".join(_FORMS)
             raise ArgumentError(f"board: expected {forms}, in mm; found {shown(word)}") from None
+        if kind in ("chessboard", "circles"):
+            make = Board.chessboard if kind == "chessboard" else Board.circles
+            return make(columns, rows_, length)
         if kind == "charuco":
-            return Board.charuco(columns, rows_, *lengths, dictionary, legacy)
-        return Board.apriltags(columns, rows_, *lengths, dictionary)
+            return Board.charuco(columns, rows_, length, inner, dictionary, legacy)
+        return Board.apriltags(columns, rows_, length, inner, dictionary)
 
     @property
     def outline(self) -> FloatArray:
@@ -286,6 +289,11 @@ def _shape(columns: int, rows_: int, least: int) -> tuple[int, int]:
     for name, given in (("columns", columns), ("rows", rows_)):
         if not isinstance(given, int) or given < least:
             raise ArgumentError(f"{name} must be a whole number from {least} on; found {given!r}")
+    if columns * rows_ > _MOST:
+        raise ArgumentError(
+            f"columns and rows: {columns} x {rows_} are more than {_MOST} on one board; state how"
+            " many are printed, not their size"
+        )
     return columns, rows_
 
 

@@ -166,3 +166,16 @@ def test_where_the_nozzle_would_touch_is_where_the_probe_triggered(tmp_path: Pat
     path.write_text("\n".join(old + new))
     with pytest.raises(pk.FileError, match="in another way than in line 1: make two files"):
         pk.read_measurements(path, FIRMWARE)
+
+
+def test_an_offset_of_a_probe_beside_other_readings_is_said_to_have_no_effect(
+    tmp_path: Path,
+) -> None:
+    file = tmp_path / "heights.csv"
+    file.write_text("q1 [mm],q2 [mm],q3 [mm],z [mm]\n1,2,3,4\n")
+    robot = pk.load("linear-delta")
+    assert any(
+        "offset of the probe" in note
+        for note in pk.read_measurements(file, robot, probe_offset=[1, 2, 3]).notes
+    )
+    assert not any("offset" in note for note in pk.read_measurements(file, robot).notes)

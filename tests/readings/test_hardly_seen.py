@@ -78,3 +78,15 @@ def test_a_camera_names_its_argument_that_is_none(
 ) -> None:
     with pytest.raises((ValueError, TypeError), match=rf"{next(iter(wrong))} must be"):
         replace(measured, instrument=replace(measured.instrument, **wrong))
+
+
+def test_one_pose_cannot_be_held_out(measured: pk.Measurements) -> None:
+    with pytest.raises(ValueError, match="12 rows are of one pose"):
+        measured.select(np.arange(len(measured)) < 12).split(0.2, seed=0)
+
+
+@pytest.mark.parametrize("kind", ["charuco:{},20,15,5X5_100", "chessboard:{},20", "circles:{},20"])
+def test_a_board_larger_than_any_is_refused_before_it_is_made(kind: str) -> None:
+    with pytest.raises(ValueError, match="columns and rows: 100000 x 100000 are more than"):
+        Board.parse(kind.format("100000x100000"))
+    assert len(Board.parse(kind.format("100x99")).ids) > 9000
