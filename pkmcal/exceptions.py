@@ -32,6 +32,23 @@ class FitError(ArgumentError):
     """Measurements that no geometry near the present one agrees with; the message says which."""
 
 
+class UnreachedError(FitError):
+    """Some rows at which no pose of the machine agrees with what was read there.
+
+    Attributes
+    ----------
+    rows : tuple of int
+        Which.
+    poses : int
+        Of how many poses they are.
+    """
+
+    def __init__(self, text: str, rows: tuple[int, ...], poses: int) -> None:
+        super().__init__(text)
+        self.rows = rows
+        self.poses = poses
+
+
 class FileError(ArgumentError):
     """An error in a file; the message names the file and, where it can, the line."""
 

@@ -31,7 +31,7 @@ from pkmcal.calibration.steps import (
     without_outliers,
     without_slack,
 )
-from pkmcal.diagnostics.row_errors import likely_mistakes
+from pkmcal.diagnostics.row_errors import contradicting, likely_mistakes
 from pkmcal.diagnostics.sag import sag_that_helps
 from pkmcal.effects.effect import Effects
 from pkmcal.effects.stated import effects_on
@@ -42,8 +42,8 @@ from pkmcal.estimation.own_residuals import Residual, checked_residuals
 from pkmcal.estimation.parameters import Asked, Bounds, Prior
 from pkmcal.estimation.uncertain_numbers import uncertain_sets
 from pkmcal.estimation.unused_entries import require_used
-from pkmcal.exceptions import ArgumentError, CalibrationWarning, FitError
-from pkmcal.fitted.dropped import Drop, left_out
+from pkmcal.exceptions import ArgumentError, CalibrationWarning, FitError, UnreachedError
+from pkmcal.fitted.dropped import Drop, are_few, left_out
 from pkmcal.geometry.stated_uncertainty import Uncertain, stated_uncertainty
 from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.kinematics.robot import Robot
@@ -246,8 +246,7 @@ def identify(
             equations, start = begin(rows, chosen, weighed)
             if drop_outliers:
                 part(0.25)
-                rows = without_outliers(rows, equations, start)
-                equations, start = begin(rows, chosen, weighed)
+                rows, equations, start = without_outliers(rows, equations, start, weighed)
             if drop_slack:
                 part(0.3)
             equations, slack = without_slack(equations, start) if drop_slack else (equations, ())
@@ -257,8 +256,14 @@ def identify(
                 part(0.6)
                 fit = with_datum(fit, rows)
         except FitError as error:
-            hint = likely_mistakes(rows.fitted, chosen, start)
-            if not hint and start is not None and not start.ok:
+            few = error if isinstance(error, UnreachedError) else None
+            if few is not None and not are_few(rows.fitted, few.rows):
+                few = None
+            alone = few is not None and few.poses == 1  # there is nothing to exchange it with
+            hint = [] if alone else likely_mistakes(rows.fitted, chosen, start)
+            if few is not None:
+                hint = [contradicting(rows.fitted, few.rows), *hint]
+            elif not hint and start is not None and not start.ok:
                 hint = [
                     "check units, signs and columns of their actuators, or leave these rows out"
                 ]

@@ -31,9 +31,9 @@ from pkmcal.estimation.parameters import Parameters
 from pkmcal.estimation.pose_minima import solved_in_least_minima
 from pkmcal.estimation.starts import stated_beside
 from pkmcal.estimation.unlike_components import unlike_components
-from pkmcal.exceptions import ArgumentError
+from pkmcal.exceptions import ArgumentError, UnreachedError
 from pkmcal.fitted.datum import datum as choose_datum
-from pkmcal.fitted.dropped import held_without, robust_outliers, without
+from pkmcal.fitted.dropped import are_few, held_without, robust_outliers, without
 from pkmcal.fitted.fit import Fit
 from pkmcal.fitted.fit_statistics import (
     identifiability,
@@ -166,12 +166,26 @@ def _require_predictions(equations: Equations, start: Evaluation) -> None:
             )
 
 
-def without_outliers(rows: Rows, equations: Equations, start: Evaluation) -> Rows:
-    """Leave out rows that the others contradict in a robust fit.
+def without_outliers(
+    rows: Rows, equations: Equations, start: Evaluation, loss: LossName
+) -> tuple[Rows, Equations, Evaluation]:
+    """Leave out rows that the others contradict in a robust fit, and begin without them.
 
-    Before slack is looked for: a robust fit must not take an outlier for slack.
+    Before slack is looked for: a robust fit must not take an outlier for slack. What was read at a
+    pose may contradict its actuators so much that nothing between agrees with both, as a mirrored
+    picture: it is left out first.
     """
-    return rows.without(robust_outliers(equations, start))
+    chosen = equations.parameters
+    try:
+        odd = robust_outliers(equations, start)
+    except UnreachedError as error:
+        if not are_few(rows.fitted, error.rows):
+            raise
+        rows = rows.without(error.rows)
+        equations, start = begin(rows, chosen, loss)
+        odd = robust_outliers(equations, start)
+    rows = rows.without(odd)
+    return rows, *begin(rows, chosen, loss)
 
 
 def without_slack(equations: Equations, start: Evaluation) -> tuple[Equations, tuple[Cell, ...]]:

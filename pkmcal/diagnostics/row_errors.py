@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from pkmcal.arrays import FloatArray
+from pkmcal.diagnostics.check import Remedy
 from pkmcal.diagnostics.families import GROSS
 from pkmcal.diagnostics.meant import Meant, joined_later, renamed
 from pkmcal.diagnostics.other_readings import exchanges, other_readings
@@ -20,12 +21,22 @@ from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.machine_size import compared_by
 from pkmcal.estimation.misfits import of_read
 from pkmcal.estimation.parameters import Parameters
+from pkmcal.fitted.row_names import row_names
 from pkmcal.measurements.measurements import Measurements
 
 _SHIFTS = (1, -1, 2, -2)  # rows by which readings are tried
 _LEAST_ROWS = 6
 _LEAST_SHARE = 0.25  # of the rows, for which a moved reading is there
 _MOST_TARGETS = 4  # whose orders are tried
+
+
+def contradicting(datasets: Sequence[FitData], rows: Sequence[int]) -> str:
+    """Name rows whose readings and actuators agree at no pose, and what helps."""
+    return (
+        f"{row_names(datasets, rows)}: no pose agrees both with what was read there and with the"
+        " actuators, as of another row's, or of a mirrored picture; leave these rows out with"
+        f" {Remedy('drop', 'outliers')}"
+    )
 
 
 def likely_mistakes(

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.estimator import Estimator
 from pkmcal.estimation.evaluation import Evaluation
@@ -13,7 +15,7 @@ from pkmcal.estimation.loss import LossName
 from pkmcal.estimation.mode_slips import start_in_modes
 from pkmcal.estimation.parameters import Parameters
 from pkmcal.estimation.pose_minima import in_least_minima
-from pkmcal.exceptions import FitError
+from pkmcal.exceptions import FitError, UnreachedError
 
 
 def begun(
@@ -38,11 +40,15 @@ def estimator_at(equations: Equations, start: Evaluation, loss: LossName) -> Est
     Raises
     ------
     ValueError
-        Rows that were not reached.
+        Rows that were not reached; `UnreachedError` of those whose actuators alone were.
     """
     if not start.ok and not equations.machines.unknowns:
         raise FitError(equations.failures(start))
     equations, own = equations.begin(start)
+    if not own.ok and start.ok:
+        failed = own.status != 0
+        rows = equations.table.rows[np.concatenate([failed[at] for at in equations.table.pose_of])]
+        raise UnreachedError(equations.failures(own), tuple(rows.tolist()), int(failed.sum()))
     if not own.ok:
         raise FitError(equations.failures(own))
     return Estimator.of(equations, own, loss)

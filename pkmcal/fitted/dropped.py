@@ -22,6 +22,7 @@ from pkmcal.fitted.outliers import LARGE, outliers
 Found = Literal["outliers", "slack"]
 Drop = Found | Sequence[int | Found] | None
 FOUND: tuple[Found, ...] = ("outliers", "slack")
+_FEW = 0.25  # share of the rows; where more disagree it is rather units or columns
 _WANTED = "'outliers', 'slack' or numbers of rows"
 
 
@@ -127,6 +128,13 @@ def elsewhere(equations: Equations, estimate: Estimate) -> IntArray:
     )
     found: IntArray = blocks[odd]
     return found
+
+
+def are_few(datasets: Sequence[FitData], rows: Sequence[int]) -> bool:
+    """Return whether rows may be errors of their own: few of all, and not all of a set."""
+    mine = [np.isin(data.rows, rows) for data in datasets]
+    whole = np.concatenate(mine)
+    return bool(whole.mean() <= _FEW and not any(each.all() for each in mine))
 
 
 def robust_outliers(equations: Equations, start: Evaluation) -> tuple[int, ...]:
