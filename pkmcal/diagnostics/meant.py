@@ -76,10 +76,10 @@ def renamed(measured: Measurements, names: Mapping[str, str]) -> Options | None:
     """
     found = []
     for name, other in names.items():
-        column = _column(measured, name)
-        if column is None:
+        own = column(measured, name)
+        if own is None:
             return None
-        found.append(("--rename", f"{column.heading}={other}"))
+        found.append(("--rename", f"{own.heading}={other}"))
     return tuple(found)
 
 
@@ -92,5 +92,6 @@ def _columns(measured: Measurements) -> list[Understood]:
     return [each for each in measured.understood if each.meaning is not None]
 
 
-def _column(measured: Measurements, name: str) -> Understood | None:
+def column(measured: Measurements, name: str) -> Understood | None:
+    """Return the column of a file that was read as this; None where none was."""
     return next((each for each in _columns(measured) if each.meaning == name), None)

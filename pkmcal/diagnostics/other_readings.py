@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from pkmcal.diagnostics.meant import Meant, Options, in_unit, renamed
+from pkmcal.diagnostics.meant import Meant, Options, column, in_unit, renamed
+from pkmcal.files.units import factors
 from pkmcal.measurements.inverted import inverted
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.table_layout import ORDERS, OWN_ORDER
@@ -18,19 +19,36 @@ from pkmcal.readings.components import Family
 _OWN = ("XYZ", "XZY", "YXZ", "YZX", "ZXY")  # other orders of an angle about x, y and z each
 _REVERSED = "counts the other way"
 _ANGLES = ("alpha", "beta", "gamma")
-_FACTORS = {
-    "mm": (
-        ("metres", 1e3, "m"),
-        ("centimetres", 10.0, "cm"),
-        ("inches", 25.4, "in"),
-        ("micrometres", 1e-3, "um"),
-    ),
-    "rad": (
-        ("degrees", np.pi / 180, "deg"),
-        ("milliradians", 1e-3, "mrad"),
-        ("radians that were taken for degrees", 180 / np.pi, "rad"),
-    ),
-}
+_LENGTHS = (  # what one is in mm
+    ("metres", 1e3, "m"),
+    ("centimetres", 10.0, "cm"),
+    ("inches", 25.4, "in"),
+    ("millimetres", 1.0, "mm"),
+    ("micrometres", 1e-3, "um"),
+)
+_TURNS = (
+    ("degrees", np.pi / 180, "deg"),
+    ("milliradians", 1e-3, "mrad"),
+    ("radians that were taken for degrees", 180 / np.pi, "rad"),
+)
+
+
+def _other_units(
+    measured: Measurements, names: Sequence[str], unit: str
+) -> Iterator[tuple[str, float, str]]:
+    """Units that columns may have in truth: in words, what they multiply, as headings have them.
+
+    Lengths were read in the unit that the heading of their file states.
+    """
+    if unit == "rad":
+        yield from _TURNS
+    if unit == "mm":
+        columns = [column(measured, name) for name in names]
+        units = {each.unit for each in columns if each is not None and each.unit is not None}
+        by, over = factors("mm").get(units.pop(), (1.0, 1.0)) if len(units) == 1 else (1.0, 1.0)
+        for words, size, short in _LENGTHS:
+            if size != by / over:
+                yield words, size * over / by, short
 
 
 def other_readings(
@@ -40,7 +58,7 @@ def other_readings(
     for unit in dict.fromkeys(actuator_units):
         mine = np.array([unit == other for other in actuator_units])
         names = [f"q{i + 1}" for i in np.flatnonzero(mine)]
-        for name, factor, short in _FACTORS.get(unit, ()):
+        for name, factor, short in _other_units(measured, names, unit):
             q = np.where(mine, measured.actuators * factor, measured.actuators)
             typed = in_unit(measured, names, short)
             yield Meant(f"the actuators are in {name}", typed), replace(measured, actuators=q)
@@ -49,7 +67,8 @@ def other_readings(
     yield from exchanges(measured)
     yield from other_values(measured)
     for i, unit in enumerate(actuator_units):
-        for words, factor, short in (*_FACTORS.get(unit, ()), (_REVERSED, -1.0, "")):
+        trials = _other_units(measured, [f"q{i + 1}"], unit)
+        for words, factor, short in (*trials, (_REVERSED, -1.0, "")):
             q = measured.actuators.copy()
             q[:, i] *= factor
             yield _of_column(measured, f"q{i + 1}", words, short), replace(measured, actuators=q)
@@ -61,7 +80,7 @@ def other_values(measured: Measurements) -> Iterator[tuple[Meant, Measurements]]
         mine = np.array([unit == other for other in measured.units])
         what = Family(unit).noun.replace("lengths", "measured lengths")
         alike = [name for name, other in zip(measured.components, mine, strict=True) if other]
-        for name, factor, short in _FACTORS.get(unit, ()):
+        for name, factor, short in _other_units(measured, alike, unit):
             values = measured.values * (factor if mine.all() else np.where(mine, factor, 1.0))
             typed = in_unit(measured, alike, short)
             yield Meant(f"the {what} are in {name}", typed), replace(measured, values=values)
@@ -80,7 +99,8 @@ def _single_columns(measured: Measurements) -> Iterator[tuple[Meant, Measurement
     """Read one column of what was measured in another unit, or with the other sign."""
     rows = measured.values.reshape(len(measured), -1)
     for k, (name, unit) in enumerate(zip(measured.components, measured.units, strict=True)):
-        for words, factor, short in (*_FACTORS.get(unit, ()), (_REVERSED, -1.0, "")):
+        trials = _other_units(measured, [name], unit)
+        for words, factor, short in (*trials, (_REVERSED, -1.0, "")):
             values = rows.copy()
             values[:, k] *= factor
             values = values.reshape(measured.values.shape)
