@@ -29,6 +29,7 @@ _DRAWS = 60
 _ROUNDS = 10  # of choosing and laying in turn
 _GROSS = 0.2  # rad, or share of the distance, beyond which a picture is off and no more
 _ODD, _TIMES = 0.05, 10.0  # the same, and times the median, by which a picture is of another row
+_MOST = 10.0  # times by which a step makes a board smaller
 _LISTED = 6  # pictures
 _ASTRAY = 0.3  # share of the way between pictures, by which most are off their places at most
 
@@ -94,6 +95,9 @@ def tool_places(
         how: disagreement(_agreed(corner, pixel, picture, lens, *trial)[0], trial[1])
         for how, trial in trials.items()
     }
+    times = _times_larger(places, pose)
+    larger = places * np.repeat([times, 1.0], 3)
+    found[f"with a board {times:.4g} times as large"] = disagreement(larger, pose)
     how = min(found, key=lambda each: found[each])
     fits = found[how] * _FALLS < off
     if fits or off > _GROSS or astray:
@@ -103,12 +107,15 @@ def tool_places(
                 " …" if len(odd) > _LISTED else ""
             )
             better = f", for {len(odd)} of {len(pose)} do not agree with the others: {which}"
-        raise FitError(
+        text = (
             f"where pictures show the board differs by {np.degrees(off):.2g} deg from"
             f" how the machine moves{better}: pictures and"
-            " actuators have to belong together, row by row; check what the camera is on, and signs"
-            " and units of the actuators"
+            " actuators have to belong together, row by row; check what the camera is on, signs and"
+            " units of the actuators, the size of the board in mm, and the lens"
         )
+        if fits and not len(odd):  # nothing else has to be tried
+            raise ArgumentError(f"measurements: {text}")
+        raise FitError(text)
     return places
 
 
@@ -225,6 +232,18 @@ def disagreement(seen: FloatArray, pose: FloatArray) -> float:
     every = np.arange(len(seen))
     off = _misfits(seen[:, None], pose, every, np.zeros_like(every))
     return float(np.nanmedian(off)) if np.isfinite(off).any() else np.inf
+
+
+def _times_larger(seen: FloatArray, pose: FloatArray) -> float:
+    """By what the lengths of the places (P, 6) at which pictures show the board would fit best."""
+    known = np.isfinite(seen).all(axis=1) & np.isfinite(pose).all(axis=1)
+    place, times = seen[known, :3] - seen[known, :3].mean(axis=0), 1.0
+    for _ in range(_ROUNDS):
+        frame, tool = of_frame_and_tool(seen[known] * np.repeat([times, 1.0], 3), pose[known])
+        laid = compose(compose(frame, pose[known]), tool)[:, :3]
+        laid = laid - laid.mean(axis=0)
+        times = max(float((place * laid).sum() / (place**2).sum()), times / _MOST)
+    return times
 
 
 def _astray(seen: FloatArray, pose: FloatArray) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from dataclasses import replace
 from typing import Any
@@ -323,6 +324,17 @@ def test_pictures_of_the_rows_beside_are_refused(sound: pk.Measurements) -> None
     shifted = np.roll(sound.actuators, len(BOARD.ids), axis=0)
     with pytest.raises(pk.ArgumentError, match="deg with the actuators of the next picture"):
         checks(replace(sound, actuators=shifted))
+
+
+@pytest.mark.parametrize(("unit", "larger"), [(1e-3, 1000), (1 / 25.4, 25.4), (25.4, 0.03937)])
+def test_a_board_in_another_unit_is_named(
+    sound: pk.Measurements, unit: float, larger: float
+) -> None:
+    corner = unit * np.asarray(sound.instrument.corner)
+    with pytest.raises(pk.ArgumentError, match=r"with a board .* times as large") as error:
+        checks(with_lens(sound, corner=corner))  # type: ignore[arg-type]
+    found = re.search(r"with a board ([\d.]+) times as large", str(error.value))
+    assert found is not None and float(found[1]) == pytest.approx(larger, rel=2e-3)
 
 
 def test_a_camera_on_the_other_of_base_and_platform_is_named(sound: pk.Measurements) -> None:
