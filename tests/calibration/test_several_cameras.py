@@ -20,7 +20,9 @@ from ..simulated import said_by
 
 FREE = ["base*", "platform*", "offset*"]
 PLATE, DISC = Board.chessboard(5, 4, 30), Board.chessboard(4, 3, 40)
-LENS: dict[str, Any] = {"fx": 1500.0, "fy": 1500.0, "cx": 640.0, "cy": 400.0, "k1": -0.1}
+LENS: dict[str, Any] = {
+    "fx": 1500.0, "fy": 1500.0, "cx": 640.0, "cy": 400.0, "k1": -0.1, "width": 1280, "height": 800,
+}  # fmt: skip
 STANDS = {"left": [-150, 120, 1950, 3.0, 0.1, 0.2], "right": [260, -80, 1800, -3.0, 0.05, 1.7]}
 CARRIED = {"plate": [-60, -45, 20, np.pi, 0, 0.3], "disc": [40, 70, 25, np.pi, 0.05, -0.8]}
 SCATTER, NOISE = 0.01, 0.1  # mm of legs, px

@@ -14,7 +14,7 @@ from pkmcal.diagnostics.scale import Scale
 from pkmcal.fitted.machine_accuracy import machine_rates
 from pkmcal.readings import Camera
 
-from .test_pictures import checks, pictures, with_lens
+from .test_pictures import PLAIN, checks, pictures, with_lens
 
 
 @pytest.fixture(scope="module")
@@ -95,7 +95,7 @@ def rotary() -> pk.Measurements:
     """Pictures of a machine of which the board alone tells the size."""
     robot = pk.load("6-rus")
     camera = Camera(
-        fx=1500.0, fy=1500.0, stands=[0, 0, float(robot.home[2]) + 900, np.pi, 0, 0],
+        **PLAIN, stands=[0, 0, float(robot.home[2]) + 900, np.pi, 0, 0],
         carried=[0, 0, 0, np.pi, 0, 0],
     )  # fmt: skip
     poses = pk.sample_poses(robot, 20, seed=0, share=0.2)
