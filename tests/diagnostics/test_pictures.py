@@ -310,8 +310,8 @@ def test_a_lens_without_its_distortion_is_named_beside_a_fit_that_is_none(
 ) -> None:
     straight = with_lens(sound, k1=0.3, k2=0.0, p1=0.0, p2=0.0)
     some = straight.select(straight.group < 12)
-    assert "the lens is not that of these pictures" in doubts(some)
-    found, _ = checks(replace(some, actuator_sigma=0.0))
+    found, said = checks(replace(some, actuator_sigma=0.0))
+    assert "the lens is not that of these pictures" in said["doubtful-readings"]
     assert found.verdict.state != "calibrated"
 
 
