@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,13 +13,7 @@ import pkmcal as pk
 from pkmcal.readings import Camera
 from pkmcal.report import contents, report
 
-from ..diagnostics.test_pictures import BOARD, FREE, LENS, pictures, with_lens
-
-
-def fitted(measured: pk.Measurements, **options: Any) -> pk.Identification:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", pk.CalibrationWarning)
-        return pk.identify(pk.load("hexapod"), measured, FREE, fix="datum", **options)
+from ..diagnostics.test_pictures import BOARD, LENS, fitted, pictures, with_lens
 
 
 @pytest.fixture(scope="module")

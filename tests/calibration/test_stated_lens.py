@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,7 @@ import pkmcal as pk
 from pkmcal.readings import Camera
 from pkmcal.readings.lens import covariance_of_lens
 
-from ..diagnostics.test_pictures import FREE, LENS, pictures, with_lens
+from ..diagnostics.test_pictures import LENS, fitted, pictures, with_lens
 
 SIGMA = np.array([3, 3, 2, 2, 5e-3, 1e-2, 2e-4, 2e-4, 0])
 YAML = """%YAML:1.0
@@ -41,12 +40,6 @@ dist_coeffs_std_dev: !!opencv-matrix
    dt: d
    data: [ 0.01, 0.02, 0., 0., 0. ]
 """
-
-
-def fitted(measured: pk.Measurements) -> pk.Identification:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", pk.CalibrationWarning)
-        return pk.identify(pk.load("hexapod"), measured, FREE, fix="datum")
 
 
 def by_itself(found: pk.Identification) -> float:

@@ -14,7 +14,7 @@ from pkmcal.diagnostics.scale import Scale
 from pkmcal.fitted.machine_accuracy import machine_rates
 from pkmcal.readings import Camera
 
-from .test_pictures import PLAIN, checks, pictures, with_lens
+from .test_pictures import PLAIN, fitted, pictures, with_lens
 
 
 @pytest.fixture(scope="module")
@@ -26,10 +26,6 @@ def printed(measured: pk.Measurements, larger: float, **fields: Any) -> pk.Measu
     """The same pictures, of a board that is larger than what is stated."""
     corner = np.asarray(measured.instrument.corner) / (1.0 + larger)
     return with_lens(measured, corner=corner, **fields)  # type: ignore[arg-type]
-
-
-def fitted(measured: pk.Measurements) -> pk.Identification:
-    return checks(measured)[0]
 
 
 def moved(one: pk.Identification, other: pk.Identification) -> float:

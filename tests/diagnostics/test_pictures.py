@@ -54,10 +54,14 @@ def pictures(
     )
 
 
-def checks(measured: pk.Measurements, **options: Any) -> tuple[pk.Identification, dict[str, str]]:
+def fitted(measured: pk.Measurements, **options: Any) -> pk.Identification:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", pk.CalibrationWarning)
-        found = pk.identify(pk.load("hexapod"), measured, FREE, fix="datum", **options)
+        return pk.identify(pk.load("hexapod"), measured, FREE, fix="datum", **options)
+
+
+def checks(measured: pk.Measurements, **options: Any) -> tuple[pk.Identification, dict[str, str]]:
+    found = fitted(measured, **options)
     return found, {each.check: each.text for each in found.verdict.said}
 
 
