@@ -54,7 +54,7 @@ def of_pictures(measured: pk.Measurements) -> pk.Measurements:
 def fitted(measured: pk.Measurements, **options: Any) -> pk.Identification:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", pk.CalibrationWarning)
-        return pk.identify(pk.load("hexapod"), measured, FREE, fix="datum", **options)
+        return pk.identify(pk.load("hexapod"), measured, FREE, **options)
 
 
 def off(found: pk.Identification, true: pk.Robot) -> float:
@@ -70,7 +70,7 @@ UNKNOWN = {"unknown": ["frame", "target"]}
 
 
 def test_rows_with_their_covariance_are_worth_the_pictures_and_alike_they_are_not() -> None:
-    tried = [pictures(seed) for seed in range(3)]
+    tried = [pictures(seed) for seed in range(2)]
     each = []
     for true, measured in tried:
         poses = of_pictures(measured)
@@ -81,7 +81,7 @@ def test_rows_with_their_covariance_are_worth_the_pictures_and_alike_they_are_no
         each.append([off(found, true) for found in several])
         assert several[1].chi2_per_dof == pytest.approx(1.0, abs=0.4)
     pixels, covariances, alike = np.sqrt(np.mean(np.square(each), axis=0))
-    assert covariances == pytest.approx(pixels, rel=0.1)
+    assert covariances == pytest.approx(pixels, rel=0.05)
     assert alike > 2.5 * pixels
 
 
