@@ -151,8 +151,10 @@ def test_a_focal_length_in_proportion_to_the_other_is_wrong_with_it(tmp_path: Pa
         ("dist_coeffs_std_dev: [ .nan, 1, 1, 1, 1 ]\n", "expected a list of finite numbers"),
     ],
 )
-def test_deviations_that_do_not_fit_name_the_file(tmp_path: Path, text: str, message: Any) -> None:
+def test_deviations_that_do_not_fit_name_file_and_line(
+    tmp_path: Path, text: str, message: Any
+) -> None:
     path = tmp_path / "lens.yaml"
     path.write_text(YAML + text)
-    with pytest.raises(pk.FileError, match=f"lens.yaml: .*{message}"):
+    with pytest.raises(pk.FileError, match=f"lens.yaml, line 14: .*{message}"):
         Camera.from_file(path)
