@@ -254,9 +254,9 @@ def fitted_along(beside: Sequence[Nuisance]) -> str:
     """Count the uncertain numbers that were fitted as well, and name those that moved."""
     far = [each.name for each in beside if each.moved]
     shown = f"; in the table those that moved by more than twice it: {listed(far)}" if far else ""
-    return filled(
-        "", f"{len(beside)} numbers were fitted along within their stated uncertainty{shown}"
-    )
+    many = "1 number was" if len(beside) == 1 else f"{len(beside)} numbers were"
+    within = "its" if len(beside) == 1 else "their"
+    return filled("", f"{many} fitted along within {within} stated uncertainty{shown}")
 
 
 def bounds(names: Sequence[str]) -> str:
