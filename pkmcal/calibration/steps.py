@@ -16,6 +16,7 @@ import numpy as np
 
 from pkmcal.arms.arm import SerialArm
 from pkmcal.calibration.identification import Identification
+from pkmcal.diagnostics.row_errors import contradicting
 from pkmcal.estimation import solving
 from pkmcal.estimation.begin import begun, estimator_at
 from pkmcal.estimation.datasets import as_fitted, informative
@@ -205,7 +206,10 @@ def solve(
     estimator = estimator_at(equations, start, loss)
     estimate = solved_in_least_minima(estimator)
     if failed := equations.failures(estimate.evaluation):
-        raise ArgumentError(f"{failed} where the search ended")
+        odd = equations.unreached(estimate.evaluation)
+        few = are_few(equations.prediction.datasets, odd)
+        hint = f"; {contradicting(equations.prediction.datasets, odd)}" if few else ""
+        raise ArgumentError(f"{failed} where the search ended{hint}")
     require_true(equations.prediction, estimate.evaluation)
     equations.parameters.require_true_residuals(estimate.evaluation.theta)
     return Fit(start, estimator, estimate, slack, rule=rule)

@@ -141,8 +141,8 @@ def _text(found: Solution, seen: Scale) -> str:
         return f"{rests}, whose size is stated to {100.0 * seen.known:.2g} %"
     one = f"{rests}: one" if seen.alone else f"a {thing}"
     return (
-        f"{one} that is {100.0 * seen.harmful:.1g} % larger or smaller than stated puts the machine"
-        " off by as much as its ± say; state how well the size is known, --size-sigma"
+        f"{one} that is some {100.0 * seen.harmful:.1g} % larger or smaller than stated puts the"
+        " machine off by as much as its ± say; state how well the size is known, --size-sigma"
         " (size_sigma=), and they contain it"
     )
 

@@ -23,7 +23,7 @@ from pkmcal.statistics.causes import taken_along
 from pkmcal.statistics.linear_fit import LinearFit
 from pkmcal.statistics.score_test import Beside, beside
 
-HARMFUL = 0.5  # times its ± by which such errors move a machine
+HARMFUL = 0.25  # times its ± by which such errors move a machine; smooth ones do so more
 _READINGS = 4  # of a point, from which its own error is told from noise
 _MOST = 400  # points that are tested
 
@@ -43,7 +43,7 @@ class StatedPoints:
     off : float
         Estimated standard deviation of a coordinate, mm.
     shift : float
-        How far such errors move the machine, over how well it is stated to be known.
+        How far the errors move the machine, over how well it is stated to be known.
     """
 
     noun: str
@@ -61,13 +61,16 @@ def stated_points(found: Solution) -> StatedPoints | None:
     which, noun, count = _points(fit)
     if not count:
         return None
-    linear, columns = _beside_instruments(found), of_rows(fit, _moved(fit, which, count))
-    taken = beside(linear, found.weighed.columns(columns))
-    if taken is None or taken.chance >= RARE:
+    columns = found.weighed.columns(of_rows(fit, _moved(fit, which, count)))
+    beside_lens = beside(_beside_instruments(found), columns)
+    if beside_lens is None or beside_lens.chance >= RARE:
         return None
-    off = _deviation(taken)
-    moved = fit.parameters.scale[:, None] * linear.back @ taken.by_basis
-    return StatedPoints(noun, count, taken.chance, off, off * times_stated(fit, moved))
+    taken = beside(found.weighed.fit, columns)
+    if taken is None:
+        return None
+    off, errors = _errors(taken)
+    moved = fit.parameters.scale[:, None] * taken.fit.back @ taken.by_basis @ errors
+    return StatedPoints(noun, count, beside_lens.chance, off, times_stated(fit, moved))
 
 
 def _beside_instruments(found: Solution) -> LinearFit:
@@ -113,14 +116,25 @@ def _moved(fit: Fit, which: dict[int, IntArray], count: int) -> Change:
     return change
 
 
-def _deviation(taken: Beside) -> float:
-    """Estimate the deviation of a coordinate by what the columns explain beyond noise, mm."""
+def _errors(taken: Beside) -> tuple[float, FloatArray]:
+    """Estimate the deviation of a coordinate, mm, and what all errors are (3 K, 1 + 3 K).
+
+    The first column has what they are by the readings, if as large ones were likely for all; the
+    others what is not known of them: their squares add up to what is expected.
+    """
     fit, k = taken.fit, len(taken.along)
     noise = max(fit.squares - taken.drop, 0.0) / max(fit.freedom - k, 1.0)
-    inverse = taken.half @ taken.half.T
-    told = np.linalg.eigvalsh(inverse)
-    whole = float((1.0 / told[-k:]).sum())
-    return float(np.sqrt(max(taken.drop - k * noise, 0.0) / whole))
+    size, axes = np.linalg.eigh(taken.half @ taken.half.T)
+    size, axes = size[-k:], axes[:, -k:]
+    tells = taken.half.T @ (axes / size) @ axes.T  # (k, 3 K), what `along` has of each
+    variance = max(taken.drop - k * noise, 0.0) / float((1.0 / size).sum())
+    told = np.linalg.solve(
+        variance * tells @ tells.T + noise * np.eye(k), variance * tells
+    ).T  # (3 K, k)
+    left = variance * (np.eye(len(told)) - told @ tells)
+    values, ways = np.linalg.eigh(left)
+    rest = ways * np.sqrt(np.maximum(values, 0.0))
+    return float(np.sqrt(variance)), np.column_stack([told @ taken.along, rest])
 
 
 def _level(found: Solution, seen: StatedPoints) -> Level:
@@ -131,8 +145,8 @@ def _say(found: Solution, seen: StatedPoints) -> str:
     return (
         f"{seen.noun} are not where they are stated ({chance_text(seen.chance)}): each is some"
         f" {seen.off:.2g} mm off along an axis, alike in all readings, which puts the machine off"
-        f" by {seen.shift:.2g} times its ±; measure where they are and state that, or take a"
-        " better one"
+        f" by {seen.shift:.2g} times its ± or more; measure where they are and state that, or take"
+        " a better one, or another detector"
     )
 
 

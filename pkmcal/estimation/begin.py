@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.estimator import Estimator
 from pkmcal.estimation.evaluation import Evaluation
@@ -46,9 +44,8 @@ def estimator_at(equations: Equations, start: Evaluation, loss: LossName) -> Est
         raise FitError(equations.failures(start))
     equations, own = equations.begin(start)
     if not own.ok and start.ok:
-        failed = own.status != 0
-        rows = equations.table.rows[np.concatenate([failed[at] for at in equations.table.pose_of])]
-        raise UnreachedError(equations.failures(own), tuple(rows.tolist()), int(failed.sum()))
+        poses = int((own.status != 0).sum())
+        raise UnreachedError(equations.failures(own), equations.unreached(own), poses)
     if not own.ok:
         raise FitError(equations.failures(own))
     return Estimator.of(equations, own, loss)

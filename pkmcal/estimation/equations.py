@@ -432,6 +432,11 @@ class Equations:
             information = information + np.diag(weights**2 @ beyond)
         return squares, freedom, information
 
+    def unreached(self, evaluation: Evaluation) -> tuple[int, ...]:
+        """Numbers of the rows at whose poses nothing was found."""
+        failed = np.concatenate([evaluation.status[place] != 0 for place in self.table.pose_of])
+        return tuple(self.table.rows[failed].tolist())
+
     def failures(self, evaluation: Evaluation) -> str:
         """Say which rows failed and why; empty where the forward kinematics solved all."""
         status = np.concatenate([evaluation.status[place] for place in self.table.pose_of])

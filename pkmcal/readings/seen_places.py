@@ -106,7 +106,8 @@ def tool_places(
             which = ", ".join(names[i] for i in odd[:_LISTED]) + (
                 " …" if len(odd) > _LISTED else ""
             )
-            better = f", for {len(odd)} of {len(pose)} do not agree with the others: {which}"
+            better = f", for {len(odd)} of {len(pose)} do not agree with the others: {which},"
+            better += " which you may leave out"
         text = (
             f"where pictures show the board differs by {np.degrees(off):.2g} deg from"
             f" how the machine moves{better}: pictures and"

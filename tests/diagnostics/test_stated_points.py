@@ -72,3 +72,18 @@ def test_a_lens_that_is_off_is_no_board_that_is(
 ) -> None:
     """It moves corners alike in all pictures, too, as far as they are in one place of these."""
     assert "stated-points" not in checks(with_lens(sound, **lens))[1]
+
+
+def test_a_board_that_is_stretched_one_way_is_doubted_with_what_that_does(
+    sound: pk.Measurements,
+) -> None:
+    """Errors that follow a pattern move the machine further than as large ones at random."""
+    pattern = BOARD.places * [1e-3, -1e-3, 0.0]
+    found, _ = checks(elsewhere(sound, pattern))
+    (own,) = (each for each in found.verdict.said if each.check == "stated-points")
+    shuffled = np.random.default_rng(2).permuted(pattern[:, :2], axis=0)
+    other, _ = checks(elsewhere(sound, np.column_stack([shuffled, pattern[:, 2]])))
+    (random,) = (each for each in other.verdict.said if each.check == "stated-points")
+    assert own.finding.off < random.finding.off
+    assert own.finding.shift / own.finding.off > 2.0 * random.finding.shift / random.finding.off
+    assert own.level == "doubt"
