@@ -29,7 +29,7 @@ from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.fitted.held_numbers import considered_places
 from pkmcal.fitted.instruments import CalibratedPicture, pictures
 from pkmcal.fitted.instruments import instruments as instruments_of
-from pkmcal.fitted.machine_accuracy import UNDETERMINED, machine_accuracy
+from pkmcal.fitted.machine_accuracy import UNDETERMINED, machine_accuracy, measured_places
 from pkmcal.fitted.row_names import row_names
 from pkmcal.fitted.solution import Machine, Solution
 from pkmcal.kinematics.calibratable import as_machine, as_parallel
@@ -165,9 +165,7 @@ class Identification(Solution[Machine], Result):
 
     def _by_itself(self) -> FloatArray:
         """Standard deviation of the platform at the measured poses but for its frames, mm (N,)."""
-        end = self.fit.end
-        at = self.fit.parameters.robot.as_commands(end.pose, end.actuators)
-        places = at[np.isfinite(end.pose).all(axis=1)]
+        places = measured_places(self.fit)
         return machine_accuracy(self.fit, places, places)
 
     def robot_of(self, session: str) -> Machine:

@@ -43,7 +43,7 @@ from pkmcal.estimation.parameters import Asked, Bounds, Prior
 from pkmcal.estimation.uncertain_numbers import uncertain_sets
 from pkmcal.estimation.unused_entries import require_used
 from pkmcal.exceptions import ArgumentError, CalibrationWarning, FitError, UnreachedError
-from pkmcal.fitted.dropped import Drop, are_few, left_out
+from pkmcal.fitted.dropped import Drop, left_out
 from pkmcal.geometry.stated_uncertainty import Uncertain, stated_uncertainty
 from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.kinematics.robot import Robot
@@ -246,7 +246,7 @@ def identify(
             equations, start = begin(rows, chosen, weighed)
             if drop_outliers:
                 part(0.25)
-                rows, equations, start = without_outliers(rows, equations, start, weighed)
+                rows, equations, start = without_outliers(rows, chosen, equations, start, weighed)
             if drop_slack:
                 part(0.3)
             equations, slack = without_slack(equations, start) if drop_slack else (equations, ())
@@ -256,14 +256,13 @@ def identify(
                 part(0.6)
                 fit = with_datum(fit, rows)
         except FitError as error:
-            few = error if isinstance(error, UnreachedError) else None
-            if few is not None and not are_few(rows.fitted, few.rows):
-                few = None
-            alone = few is not None and few.poses == 1  # there is nothing to exchange it with
-            hint = [] if alone else likely_mistakes(rows.fitted, chosen, start)
-            if few is not None:
-                hint = [contradicting(rows.fitted, few.rows), *hint]
-            elif not hint and start is not None and not start.ok:
+            hint, alone = list[str](), False
+            if isinstance(error, UnreachedError):
+                hint = contradicting(rows.fitted, error.rows)
+                alone = bool(hint) and error.poses == 1  # there is nothing to exchange it with
+            if not alone:
+                hint += likely_mistakes(rows.fitted, chosen, start)
+            if not hint and start is not None and not start.ok:
                 hint = [
                     "check units, signs and columns of their actuators, or leave these rows out"
                 ]

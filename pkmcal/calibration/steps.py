@@ -168,7 +168,7 @@ def _require_predictions(equations: Equations, start: Evaluation) -> None:
 
 
 def without_outliers(
-    rows: Rows, equations: Equations, start: Evaluation, loss: LossName
+    rows: Rows, chosen: Parameters, equations: Equations, start: Evaluation, loss: LossName
 ) -> tuple[Rows, Equations, Evaluation]:
     """Leave out rows that the others contradict in a robust fit, and begin without them.
 
@@ -176,7 +176,6 @@ def without_outliers(
     pose may contradict its actuators so much that nothing between agrees with both, as a mirrored
     picture: it is left out first.
     """
-    chosen = equations.parameters
     try:
         odd = robust_outliers(equations, start)
     except UnreachedError as error:
@@ -207,9 +206,8 @@ def solve(
     estimate = solved_in_least_minima(estimator)
     if failed := equations.failures(estimate.evaluation):
         odd = equations.unreached(estimate.evaluation)
-        few = are_few(equations.prediction.datasets, odd)
-        hint = f"; {contradicting(equations.prediction.datasets, odd)}" if few else ""
-        raise ArgumentError(f"{failed} where the search ended{hint}")
+        named = contradicting(equations.prediction.datasets, odd)
+        raise ArgumentError("; ".join([f"{failed} where the search ended", *named]))
     require_true(equations.prediction, estimate.evaluation)
     equations.parameters.require_true_residuals(estimate.evaluation.theta)
     return Fit(start, estimator, estimate, slack, rule=rule)

@@ -21,6 +21,7 @@ from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.machine_size import compared_by
 from pkmcal.estimation.misfits import of_read
 from pkmcal.estimation.parameters import Parameters
+from pkmcal.fitted.dropped import are_few
 from pkmcal.fitted.row_names import row_names
 from pkmcal.measurements.measurements import Measurements
 
@@ -30,13 +31,15 @@ _LEAST_SHARE = 0.25  # of the rows, for which a moved reading is there
 _MOST_TARGETS = 4  # whose orders are tried
 
 
-def contradicting(datasets: Sequence[FitData], rows: Sequence[int]) -> str:
-    """Name rows whose readings and actuators agree at no pose, and what helps."""
-    return (
+def contradicting(datasets: Sequence[FitData], rows: Sequence[int]) -> list[str]:
+    """Name rows whose readings and actuators agree at no pose, and what helps; none of many."""
+    if not are_few(datasets, rows):
+        return []
+    return [
         f"{row_names(datasets, rows)}: no pose agrees both with what was read there and with the"
         " actuators, as of another row's, or of a mirrored picture; leave these rows out with"
         f" {Remedy('drop', 'outliers')}"
-    )
+    ]
 
 
 def likely_mistakes(

@@ -137,8 +137,9 @@ def _text(found: Solution, seen: Scale) -> str:
             f" is rather {percent:.2g} % {other} than stated; measure it and state its size as it"
             " is, or measure one distance of the machine"
         )
-    if seen.known:
-        return f"{rests}, whose size is stated to {100.0 * seen.known:.2g} %"
+    if np.isinf(seen.harmful):  # none is held, or the machine is not determined at all
+        known = f", whose size is stated to {100.0 * seen.known:.2g} %" if seen.known else ""
+        return f"{rests}{known}"
     one = f"{rests}: one" if seen.alone else f"a {thing}"
     return (
         f"{one} that is some {100.0 * seen.harmful:.1g} % larger or smaller than stated puts the"

@@ -23,7 +23,7 @@ from pkmcal.statistics.causes import taken_along
 from pkmcal.statistics.linear_fit import LinearFit
 from pkmcal.statistics.score_test import Beside, beside
 
-HARMFUL = 0.25  # times its ± by which such errors move a machine; smooth ones do so more
+_HARMFUL = 0.25  # times its ± by which such errors move a machine; smooth ones do so more
 _READINGS = 4  # of a point, from which its own error is told from noise
 _MOST = 400  # points that are tested
 
@@ -138,7 +138,7 @@ def _errors(taken: Beside) -> tuple[float, FloatArray]:
 
 
 def _level(found: Solution, seen: StatedPoints) -> Level:
-    return "doubt" if seen.shift > HARMFUL else "remark"
+    return "doubt" if seen.shift > _HARMFUL else "remark"
 
 
 def _say(found: Solution, seen: StatedPoints) -> str:

@@ -43,9 +43,9 @@ def estimator_at(equations: Equations, start: Evaluation, loss: LossName) -> Est
     if not start.ok and not equations.machines.unknowns:
         raise FitError(equations.failures(start))
     equations, own = equations.begin(start)
-    if not own.ok and start.ok:
-        poses = int((own.status != 0).sum())
-        raise UnreachedError(equations.failures(own), equations.unreached(own), poses)
     if not own.ok:
-        raise FitError(equations.failures(own))
+        failed = equations.failures(own)
+        if not start.ok:
+            raise FitError(failed)
+        raise UnreachedError(failed, equations.unreached(own), int((own.status != 0).sum()))
     return Estimator.of(equations, own, loss)

@@ -14,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray
+from pkmcal.arrays import BoolArray, FloatArray, Int32Array
 from pkmcal.core.library import STATUS
 from pkmcal.estimation.compression import compressed
 from pkmcal.estimation.derivatives import derivatives, jacobian
@@ -434,10 +434,12 @@ class Equations:
 
     def unreached(self, evaluation: Evaluation) -> tuple[int, ...]:
         """Numbers of the rows at whose poses nothing was found."""
-        failed = np.concatenate([evaluation.status[place] != 0 for place in self.table.pose_of])
-        return tuple(self.table.rows[failed].tolist())
+        return tuple(self.table.rows[self._status_of_rows(evaluation) != 0].tolist())
 
     def failures(self, evaluation: Evaluation) -> str:
         """Say which rows failed and why; empty where the forward kinematics solved all."""
-        status = np.concatenate([evaluation.status[place] for place in self.table.pose_of])
-        return failed_rows(status, STATUS, self.table.rows, most=10)
+        return failed_rows(self._status_of_rows(evaluation), STATUS, self.table.rows, most=10)
+
+    def _status_of_rows(self, evaluation: Evaluation) -> Int32Array:
+        status: Int32Array = np.concatenate([evaluation.status[at] for at in self.table.pose_of])
+        return status

@@ -35,12 +35,23 @@ def machine_accuracy(fit: Fit, places: FloatArray, reference: FloatArray) -> Flo
     ndarray (N,)
         inf where it moves along with what the measurements do not determine.
     """
-    alone = machine_rates(fit, places, reference)
+    return _deviations(fit, machine_rates(fit, places, reference))
+
+
+def _deviations(fit: Fit, alone: FloatArray) -> FloatArray:
+    """Return `machine_accuracy` (N,) by the `machine_rates` (N, 3, g) of its places."""
     own = fit.parameters.geometry_of()
     variance = propagate(alone, fit.covariance[np.ix_(own, own)])
     undetermined = (fit.undetermined() * fit.parameters.scale[:, None])[own]
     moved = np.linalg.norm(alone @ undetermined, axis=(1, 2))
     return np.where(moved < UNDETERMINED, np.sqrt(variance), np.inf)
+
+
+def measured_places(fit: Fit) -> FloatArray:
+    """The measured poses (N, 6), of an arm (N, n), as places of `machine_accuracy`."""
+    end = fit.end
+    at = fit.parameters.robot.as_commands(end.pose, end.actuators)
+    return at[np.isfinite(end.pose).all(axis=1)]
 
 
 def times_stated(fit: Fit, changes: FloatArray) -> float:
@@ -55,13 +66,12 @@ def times_stated(fit: Fit, changes: FloatArray) -> float:
     changes : ndarray (n, k)
         Of the parameters, mm and rad, by k errors that have nothing to do with each other.
     """
-    end = fit.end
-    known = np.isfinite(end.pose).all(axis=1)
-    if not known.any():
+    places = measured_places(fit)
+    if not len(places):
         return float("nan")
-    places = fit.parameters.robot.as_commands(end.pose, end.actuators)[known]
-    off = machine_rates(fit, places, places) @ changes[fit.parameters.geometry_of()]
-    stated = rms(machine_accuracy(fit, places, places))
+    alone = machine_rates(fit, places, places)
+    off = alone @ changes[fit.parameters.geometry_of()]
+    stated = rms(_deviations(fit, alone))
     usual = np.isfinite(stated) and stated > 0.0
     return float(np.sqrt(np.square(off).sum() / len(off)) / stated) if usual else float("nan")
 
@@ -76,7 +86,7 @@ def machine_rates(fit: Fit, places: FloatArray, reference: FloatArray) -> FloatA
     told = size > _TOLD * size[0]
     flat = rates.reshape(len(left), -1)
     follow = right[told].T @ ((left[:, told].T @ flat) / size[told, None])
-    own_rates, own_motions = _rates(fit, places)
+    own_rates, own_motions = (rates, motions) if places is reference else _rates(fit, places)
     alone: FloatArray = (own_rates - own_motions @ follow)[:, 3:]
     return alone
 

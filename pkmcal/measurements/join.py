@@ -211,7 +211,8 @@ def _by_name(table: Table, log: Table) -> tuple[Rows, str] | str:
 def _twice(names: Sequence[str], column: Column) -> str:
     """Say that a log has two rows of one name, where its names are those of the points."""
     keys = [_key(each, loose=False) for each in column.cells]
-    if sum(_key(each, loose=False) in keys for each in names) < _ENOUGH * len(names):
+    logged = {*keys}
+    if sum(_key(each, loose=False) in logged for each in names) < _ENOUGH * len(names):
         return ""
     first: dict[str, int] = {}
     for row, key in enumerate(keys):

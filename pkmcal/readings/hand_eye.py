@@ -96,7 +96,7 @@ def turned_alike(m: FloatArray, p: FloatArray, back: FloatArray) -> tuple[FloatA
 
 
 def _newton_step(left: FloatArray, right: FloatArray) -> FloatArray:
-    """Turn F by a and Tᵀ by b (a, b: (6,)) so that Σ tr(L R) grows most.
+    """Return by what to turn F and Tᵀ so that Σ tr(L R) grows most, a and b in one (6,).
 
     L = Fᵀ M and R = Tᵀ Pᵀ, (N, 3, 3); behind the step L is exp(-a) L and R is exp(b) R. What poses
     do not tell is not turned.

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal.diagnostics.scale import Scale
+from pkmcal.diagnostics.scale import CHECKS, Scale
 from pkmcal.fitted.machine_accuracy import machine_rates
 from pkmcal.readings import Camera
 
@@ -132,3 +132,21 @@ def test_deviations_of_a_size_that_make_no_sense_are_refused(
 ) -> None:
     with pytest.raises(pk.ArgumentError, match=words):
         with_lens(sound, **fields)
+
+
+@pytest.mark.parametrize(
+    ("alone", "known", "harmful", "words"),
+    [
+        (True, 0.0, np.inf, "how large the machine is rests on the board alone"),
+        (True, 5e-4, np.inf, "rests on the board alone, whose size is stated to 0.05 %"),
+        (False, 5e-4, 1e-4, "a board that is some 0.01 % larger or smaller than stated puts"),
+        (True, 0.0, 2e-4, "alone: one that is some 0.02 % larger or smaller than stated puts"),
+    ],
+)
+def test_what_is_said_of_a_size_is_what_is_known(
+    exact: pk.Identification, alone: bool, known: float, harmful: float, words: str
+) -> None:
+    """Of two boards one may be stated and one held; of a machine that is not determined no ± is."""
+    (check,) = CHECKS
+    text = check.say(exact, Scale("board", alone, known, harmful, 0.0, 0.0))
+    assert words in text and "inf" not in text

@@ -53,7 +53,7 @@ def test_pixels_that_are_all_equal_are_refused_without_a_warning(
 
 @pytest.mark.parametrize("middle", [0.0, 123.456, 1e4])
 def test_corners_in_one_pixel_tell_no_board_and_those_of_a_narrow_one_do(middle: float) -> None:
-    flat = np.column_stack([BOARD.places[:, :2]])
+    flat = BOARD.places[:, :2]
     for narrow, told in ((0.0, 0), (1e-3, 12), (1.0, 12)):
         pixel = middle + flat * [1.0, narrow]
         assert len(pictures_told(BOARD.places, pixel, PICTURE)[0]) == told
