@@ -39,14 +39,11 @@ class UnreachedError(FitError):
     ----------
     rows : tuple of int
         Which.
-    poses : int
-        Of how many poses they are.
     """
 
-    def __init__(self, text: str, rows: tuple[int, ...], poses: int) -> None:
+    def __init__(self, text: str, rows: tuple[int, ...]) -> None:
         super().__init__(text)
         self.rows = rows
-        self.poses = poses
 
 
 class FileError(ArgumentError):

@@ -24,6 +24,7 @@ from pkmcal.calibration.steps import (
     begin,
     compare,
     prepare,
+    require_agreement,
     result,
     solve,
     with_component_noise,
@@ -247,6 +248,8 @@ def identify(
             if drop_outliers:
                 part(0.25)
                 rows, equations, start = without_outliers(rows, chosen, equations, start, weighed)
+            else:
+                require_agreement(rows, chosen, equations, start, weighed)
             if drop_slack:
                 part(0.3)
             equations, slack = without_slack(equations, start) if drop_slack else (equations, ())
@@ -256,12 +259,10 @@ def identify(
                 part(0.6)
                 fit = with_datum(fit, rows)
         except FitError as error:
-            hint, alone = list[str](), False
+            hint = list[str]()
             if isinstance(error, UnreachedError):
                 hint = contradicting(rows.fitted, error.rows)
-                alone = bool(hint) and error.poses == 1  # there is nothing to exchange it with
-            if not alone:
-                hint += likely_mistakes(rows.fitted, chosen, start)
+            hint = hint or likely_mistakes(rows.fitted, chosen, start)
             if not hint and start is not None and not start.ok:
                 hint = [
                     "check units, signs and columns of their actuators, or leave these rows out"

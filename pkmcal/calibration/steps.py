@@ -1,7 +1,7 @@
 """The steps of `identify`: each takes what the one before returned, and changes nothing of it.
 
-    prepare → begin → without_outliers → without_slack → solve → with_datum → with_component_noise
-            → compare → result
+    prepare → begin → without_outliers or require_agreement → without_slack → solve → with_datum
+            → with_component_noise → compare → result
 
 `Rows` says which rows there are, `Fit` what came of them.
 """
@@ -34,7 +34,7 @@ from pkmcal.estimation.starts import stated_beside
 from pkmcal.estimation.unlike_components import unlike_components
 from pkmcal.exceptions import ArgumentError, UnreachedError
 from pkmcal.fitted.datum import datum as choose_datum
-from pkmcal.fitted.dropped import are_few, held_without, robust_outliers, without
+from pkmcal.fitted.dropped import are_few, far_off, held_without, robust_outliers, without
 from pkmcal.fitted.fit import Fit
 from pkmcal.fitted.fit_statistics import (
     identifiability,
@@ -176,6 +176,9 @@ def without_outliers(
     pose may contradict its actuators so much that nothing between agrees with both, as a mirrored
     picture: it is left out first.
     """
+    if (far := far_off(equations, start)) and are_few(rows.fitted, far):
+        rows = rows.without(far)
+        equations, start = begin(rows, chosen, loss)
     try:
         odd = robust_outliers(equations, start)
     except UnreachedError as error:
@@ -186,6 +189,30 @@ def without_outliers(
         odd = robust_outliers(equations, start)
     rows = rows.without(odd)
     return rows, *begin(rows, chosen, loss)
+
+
+def require_agreement(
+    rows: Rows, chosen: Parameters, equations: Equations, start: Evaluation, loss: LossName
+) -> None:
+    """Refuse a few poses that contradict the machine which all others agree on.
+
+    Before a search among all of them, which takes long and ends anywhere.
+
+    Raises
+    ------
+    ValueError
+        There are such.
+    """
+    far = far_off(equations, start)
+    if not far or loss != "linear" or not are_few(rows.fitted, far):
+        return
+    others = rows.without(far)
+    estimate = solved_in_least_minima(estimator_at(*begin(others, chosen, loss), loss))
+    there = estimate.evaluation
+    machine = equations.with_parameters(there.parameters).with_exact_actuators()
+    if far := far_off(equations, machine.at(there.theta)):
+        count = sum(len(data.rows) for data in rows.fitted)
+        raise UnreachedError(f"{len(far)} of {count} rows contradict all others", far)
 
 
 def without_slack(equations: Equations, start: Evaluation) -> tuple[Equations, tuple[Cell, ...]]:

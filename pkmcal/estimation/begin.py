@@ -47,5 +47,5 @@ def estimator_at(equations: Equations, start: Evaluation, loss: LossName) -> Est
         failed = equations.failures(own)
         if not start.ok:
             raise FitError(failed)
-        raise UnreachedError(failed, equations.unreached(own), int((own.status != 0).sum()))
+        raise UnreachedError(failed, equations.unreached(own))
     return Estimator.of(equations, own, loss)

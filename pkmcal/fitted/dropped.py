@@ -15,6 +15,7 @@ from pkmcal.estimation.estimate import Estimate
 from pkmcal.estimation.estimator import Estimator
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.fit_data import FitData
+from pkmcal.estimation.misfits import worst_readings
 from pkmcal.estimation.pose_minima import solved_in_least_minima
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.fitted.outliers import LARGE, outliers
@@ -23,6 +24,7 @@ Found = Literal["outliers", "slack"]
 Drop = Found | Sequence[int | Found] | None
 FOUND: tuple[Found, ...] = ("outliers", "slack")
 _FEW = 0.25  # share of the rows; where more disagree it is rather units or columns
+_FAR, _TIMES = 0.05, 10.0  # of the machine's size, and times the median, by which poses are far off
 _WANTED = "'outliers', 'slack' or numbers of rows"
 
 
@@ -135,6 +137,22 @@ def are_few(datasets: Sequence[FitData], rows: Sequence[int]) -> bool:
     mine = [np.isin(data.rows, rows) for data in datasets]
     whole = np.concatenate(mine)
     return bool(whole.mean() <= _FEW and not any(each.all() for each in mine))
+
+
+def far_off(equations: Equations, start: Evaluation) -> tuple[int, ...]:
+    """Numbers of the rows of poses that contradict their actuators before anything is fitted.
+
+    Of poses at which much was read, a few that are far off where most are near: a search with a
+    mirrored picture among the others takes long and ends anywhere.
+    """
+    much = (equations.blocks.components >= LARGE).any()
+    if equations.system is None or not (much and start.ok):
+        return ()
+    off = worst_readings(equations, start.residuals)
+    usual = float(np.nanmedian(off)) if np.isfinite(off).any() else np.inf
+    odd = np.flatnonzero(off > max(_TIMES * usual, _FAR * equations.parameters.robot.length))
+    whole = [np.isin(place, odd) for place in equations.table.pose_of]
+    return tuple(equations.table.rows[np.concatenate(whole)].tolist())
 
 
 def robust_outliers(equations: Equations, start: Evaluation) -> tuple[int, ...]:

@@ -69,10 +69,14 @@ def tool_places(
         return np.empty((0, 6))
     places, behind = _agreed(corner, pixel, picture, lens, rides, pose)
     odd = _require_own_poses(places, pose, names)
-    off = disagreement(places, pose) if len(pose) > _FEWEST else 0.0
-    astray = off > _ODD / 2.0 and _astray(places, pose)
+    off, astray = _contradictions(places, pose)
     if off <= _OFF and not astray:
         return places
+    if len(odd):
+        sound = np.isin(np.arange(len(pose)), odd, invert=True)
+        off_else, astray_else = _contradictions(places[sound], pose[sound])
+        if off_else <= _OFF and not astray_else:  # the fit names the few and can leave them out
+            return np.where(sound[:, None], places, np.nan)
     mirrored = lens * np.where(np.arange(9) == 7, -1.0, 1.0)  # p2
     across = pixel * [-1, 1] + [2 * lens[2], 0]
     if behind:
@@ -235,6 +239,12 @@ def disagreement(seen: FloatArray, pose: FloatArray) -> float:
     return float(np.nanmedian(off)) if np.isfinite(off).any() else np.inf
 
 
+def _contradictions(seen: FloatArray, pose: FloatArray) -> tuple[float, bool]:
+    """Return `disagreement` and `_astray`; none of so few pictures that they tell nothing."""
+    off = disagreement(seen, pose) if len(pose) > _FEWEST else 0.0
+    return off, off > _ODD / 2.0 and _astray(seen, pose)
+
+
 def _times_larger(seen: FloatArray, pose: FloatArray) -> float:
     """By what the lengths of the places (P, 6) at which pictures show the board would fit best."""
     known = np.isfinite(seen).all(axis=1) & np.isfinite(pose).all(axis=1)
@@ -265,7 +275,7 @@ def _require_own_poses(seen: FloatArray, pose: FloatArray, names: Sequence[str])
     Returns those that are off where most agree: none where more than a quarter is.
     """
     some = np.isfinite(seen).all(axis=1) & np.isfinite(pose).all(axis=1)
-    if some.sum() <= 2 * _FEWEST:
+    if some.sum() < 2 * _FEWEST:
         return np.empty(0, dtype=np.intp)
     laid, off = pose, np.empty(0)
     for _ in range(_ROUNDS):  # of laying the better half

