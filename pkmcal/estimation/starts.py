@@ -26,7 +26,14 @@ def with_starts(machine: Calibratable, datasets: Sequence[FitData]) -> list[FitD
     found: Found = {}
     for _, mine in _by_kind(datasets):
         _ask(mine[0].measured.instrument, machine, mine, found)
-    return [replace(data, starts=found) for data in datasets]
+    return [replace(data, measured=_sized(machine, data), starts=found) for data in datasets]
+
+
+def _sized(machine: Calibratable, data: FitData) -> Measurements:
+    """The measurements, with a reading that knows what its units are in mm."""
+    m = data.measured
+    reading = m.instrument.with_sizes(m, lambda: machine.forward(m.actuators).pose)
+    return m if reading is m.instrument else replace(m, instrument=reading)
 
 
 def _ask(reading: Reading, machine: Calibratable, mine: Sequence[FitData], found: Found) -> None:

@@ -11,7 +11,7 @@ scatter is then no noise of the corners, and is estimated beside it (`tells_actu
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from typing import Any, ClassVar, Literal, get_args
@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 from pkmcal.arguments import instance, number, whole, word
 from pkmcal.arrays import FloatArray, IntArray, as_rows, first_of_equal
 from pkmcal.core import instruments, screws
-from pkmcal.core.poses import NOWHERE
+from pkmcal.core.poses import NOWHERE, compose
 from pkmcal.display import printable
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.csv_table import Table
@@ -108,6 +108,9 @@ class Camera(Reading):
         ``tool.board.plate.x`` …, ``lens.left.fx`` … and ``board.plate.size`` of the camera "left"
         and the board "plate". Each camera and board has measurements of its own; of a file with
         columns ``camera`` and ``board`` their rows are read.
+    distance : float
+        About how far what it sees is, mm, where no picture tells that, as of single markers: by it
+        pixels are shown in mm. 0: as the machine's poses are apart.
     stands, carried : (6,) array
         Of a simulated camera: the true ``frame`` and ``tool``.
 
@@ -148,6 +151,7 @@ class Camera(Reading):
     board: Board | None = None
     camera_name: str = ""
     board_name: str = ""
+    distance: float = 0.0
     stands: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     carried: ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -521,14 +525,34 @@ class Camera(Reading):
     def mm(self, m: Measured, length: float) -> FloatArray:
         """A pixel across the line of sight at the board: the median of the pictures (2,).
 
-        Of pictures that do not tell it, as far away as the machine is large.
+        Of pictures that do not tell it, at the `distance`, or as far away as the machine is large.
         """
+        told = self._told_sizes(m)
+        focal = max(self.fx, self.fy)
+        size = float(np.median(told)) if len(told) else (self.distance or length) / focal
+        return np.full(2, size)
+
+    def _told_sizes(self, m: Measured) -> FloatArray:
+        """The sizes of a pixel, mm, of the pictures that tell it."""
         corner, picture = self._corners(len(m)), self._pictures(m)
         known = np.flatnonzero(np.isfinite(m.values).all(axis=1))
         sizes = mm_per_pixel(corner[known], m.values[known], picture[known])
-        told = sizes[np.isfinite(sizes)]
-        focal = max(self.fx, self.fy)
-        return np.full(2, float(np.median(told)) if len(told) else length / focal)
+        told: FloatArray = sizes[np.isfinite(sizes)]
+        return told
+
+    def with_sizes(self, m: Measured, poses: Callable[[], FloatArray]) -> Camera:
+        """The camera with the `distance` at which poses are apart as its pictures show them."""
+        if self.distance or len(self._told_sizes(m)):
+            return self
+        pose = poses()
+        known = np.flatnonzero(np.isfinite(m.values).all(axis=1) & np.isfinite(pose).all(axis=1))
+        at = np.column_stack([self._corners(len(m)), np.zeros((len(m), 3))])[known]
+        places = compose(np.ascontiguousarray(pose[known]), at)[:, :3]
+        if not len(places):
+            return self
+        (size,) = mm_per_pixel(places, m.values[known], np.zeros(len(known), dtype=np.intp))
+        distance = float(size) * max(self.fx, self.fy)
+        return self.with_fields({"distance": distance}) if np.isfinite(distance) else self
 
     # rows -----------------------------------------------------------------------------------------
 
@@ -540,6 +564,7 @@ class Camera(Reading):
         word("lens", self.lens, tuple(FOUND))
         for side in ("width", "height"):
             whole(side, getattr(self, side), 0)
+        number("distance", self.distance, least=0.0)
         for name in ("camera_name", "board_name"):
             instance(name, getattr(self, name), str)
         if self.corner is None:

@@ -10,7 +10,7 @@ row touches.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from os import PathLike
 from typing import Any, ClassVar, NamedTuple, Protocol, TypeVar
 
@@ -414,6 +414,18 @@ class Reading:
                     f" {unit} is in mm at the machine"
                 )
         return mm_per_unit(self.units, length)
+
+    def with_sizes(self: Own, m: Measured, poses: Callable[[], FloatArray]) -> Own:
+        """The reading as `mm` needs it, which is asked beside its class alone.
+
+        Parameters
+        ----------
+        m : Measurements
+            What was read.
+        poses : callable
+            Returns the nominal machine's poses (N, 6) at these rows.
+        """
+        return self
 
     @property
     def families(self) -> tuple[Family, ...]:

@@ -240,6 +240,10 @@ def test_markers_of_one_point_each_are_found_on_the_platform() -> None:
     found = fitted(sets, free="offset*")
     assert found.verdict.state == "calibrated" and found.rank == 6 + 2 * 6 + 4 * 3
     assert found.rms < 0.1
+    away = [stands[2] - pk.load("hexapod").home[2] for stands in STANDS.values()]  # they look down
+    at_points = np.repeat(away, len(MARKERS)) / LENS["fx"]  # mm, of a pixel
+    shown = np.array(found.noise) / np.array(found.component_noise)[:, 0]
+    np.testing.assert_allclose(shown, at_points, rtol=0.25)
     named = dict(zip(found.free, found.values, strict=True))
     places = np.array([[named[f"tool.board.{mark}.{axis}"] for axis in "xyz"] for mark in MARKERS])
     right = np.array([each[:3] for each in MARKERS.values()])
