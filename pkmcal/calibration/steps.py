@@ -26,6 +26,7 @@ from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.free_parameters import parameters
 from pkmcal.estimation.loss import LossName
+from pkmcal.estimation.mode_slips import in_their_modes
 from pkmcal.estimation.other_starts import likelier_start
 from pkmcal.estimation.own_classes import require_true
 from pkmcal.estimation.parameters import Parameters
@@ -176,7 +177,7 @@ def without_outliers(
     pose may contradict its actuators so much that nothing between agrees with both, as a mirrored
     picture: it is left out first.
     """
-    if (far := far_off(equations, start)) and are_few(rows.fitted, far):
+    if far := _contradicted(rows, chosen, equations, start, loss):
         rows = rows.without(far)
         equations, start = begin(rows, chosen, loss)
     try:
@@ -203,16 +204,22 @@ def require_agreement(
     ValueError
         There are such.
     """
-    far = far_off(equations, start)
-    if not far or loss != "linear" or not are_few(rows.fitted, far):
-        return
-    others = rows.without(far)
-    estimate = solved_in_least_minima(estimator_at(*begin(others, chosen, loss), loss))
-    there = estimate.evaluation
-    machine = equations.with_parameters(there.parameters).with_exact_actuators()
-    if far := far_off(equations, machine.at(there.theta)):
+    if loss == "linear" and (far := _contradicted(rows, chosen, equations, start, loss)):
         count = sum(len(data.rows) for data in rows.fitted)
         raise UnreachedError(f"{len(far)} of {count} rows contradict all others", far)
+
+
+def _contradicted(
+    rows: Rows, chosen: Parameters, equations: Equations, start: Evaluation, loss: LossName
+) -> tuple[int, ...]:
+    """Rows of a few poses that are far off, by the machine which all others agree on, too."""
+    far = far_off(equations, start)
+    if not far or not are_few(rows.fitted, far):
+        return ()
+    others = begin(rows.without(far), chosen, loss)
+    there = solved_in_least_minima(estimator_at(*others, loss)).evaluation
+    machine = equations.with_parameters(there.parameters).with_exact_actuators()
+    return far_off(equations, in_their_modes(machine, machine.at(there.theta, near=start.states)))
 
 
 def without_slack(equations: Equations, start: Evaluation) -> tuple[Equations, tuple[Cell, ...]]:

@@ -11,6 +11,7 @@ from pkmcal.diagnostics import (
     elsewhere,
     families,
     gain,
+    held_combinations,
     held_out,
     loads,
     machine,
@@ -37,9 +38,9 @@ from pkmcal.diagnostics.diagnosis import verified
 CHECKS = verified((
     *held_out.CHECKS, *readings.CHECKS, *units.CHECKS, *refitted_readings.CHECKS,
     *families.CHECKS, *machine.CHECKS, *other_starts.CHECKS, *loads.CHECKS, *sag.CHECKS,
-    *search.CHECKS, *rows.CHECKS, *elsewhere.CHECKS, *near_copies.CHECKS, *rounded.CHECKS,
-    *noise.CHECKS, *priors.CHECKS, *course.CHECKS, *causes.CHECKS, *moved_instrument.CHECKS,
-    *stated_points.CHECKS, *scale.CHECKS, *sides.CHECKS, *regions.CHECKS, *gain.CHECKS,
-    *waves.CHECKS,
+    *search.CHECKS, *held_combinations.CHECKS, *rows.CHECKS, *elsewhere.CHECKS,
+    *near_copies.CHECKS, *rounded.CHECKS, *noise.CHECKS, *priors.CHECKS, *course.CHECKS,
+    *causes.CHECKS, *moved_instrument.CHECKS, *stated_points.CHECKS, *scale.CHECKS,
+    *sides.CHECKS, *regions.CHECKS, *gain.CHECKS, *waves.CHECKS,
 ))  # fmt: skip
 AT_ONCE = tuple(check for check in CHECKS if check.at_once)

@@ -146,12 +146,20 @@ def held_errors(jacobian: FloatArray, prior: FloatArray, rank: int, size: float)
     ndarray (n, e)
         Scaled standard deviations, a column for each.
     """
+    basis, singular = shown_beyond(jacobian, prior, rank)
+    errors: FloatArray = basis * np.minimum(1.0 / singular, size)
+    return errors
+
+
+def shown_beyond(
+    jacobian: FloatArray, prior: FloatArray, rank: int
+) -> tuple[FloatArray, FloatArray]:
+    """Combinations (n, e) beyond so many that a Jacobian shows, and their singular values (e,)."""
     if rank == jacobian.shape[1]:
-        return np.zeros((rank, 0))
+        return np.zeros((rank, 0)), np.zeros(0)
     singular, basis = decompose(jacobian, prior)
     shown = _count(singular, np.inf)
-    errors: FloatArray = basis[:, rank:shown] * np.minimum(1.0 / singular[rank:shown], size)
-    return errors
+    return basis[:, rank:shown], singular[rank:shown]
 
 
 def _count(singular: FloatArray, deviation: float) -> int:

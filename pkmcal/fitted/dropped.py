@@ -24,7 +24,7 @@ Found = Literal["outliers", "slack"]
 Drop = Found | Sequence[int | Found] | None
 FOUND: tuple[Found, ...] = ("outliers", "slack")
 _FEW = 0.25  # share of the rows; where more disagree it is rather units or columns
-_FAR, _TIMES = 0.05, 10.0  # of the machine's size, and times the median, by which poses are far off
+_FAR, _TIMES = 0.05, 10.0  # of the largest length, and times the median, by which poses are far off
 _WANTED = "'outliers', 'slack' or numbers of rows"
 
 
@@ -142,15 +142,14 @@ def are_few(datasets: Sequence[FitData], rows: Sequence[int]) -> bool:
 def far_off(equations: Equations, start: Evaluation) -> tuple[int, ...]:
     """Numbers of the rows of poses that contradict their actuators before anything is fitted.
 
-    Of poses at which much was read, a few that are far off where most are near: a search with a
-    mirrored picture among the others takes long and ends anywhere.
+    Of poses at which much was read, those that are far off where most are near.
     """
     much = (equations.blocks.components >= LARGE).any()
     if equations.system is None or not (much and start.ok):
         return ()
     off = worst_readings(equations, start.residuals)
     usual = float(np.nanmedian(off)) if np.isfinite(off).any() else np.inf
-    odd = np.flatnonzero(off > max(_TIMES * usual, _FAR * equations.parameters.robot.length))
+    odd = np.flatnonzero(off > max(_TIMES * usual, _FAR * equations.size))
     whole = [np.isin(place, odd) for place in equations.table.pose_of]
     return tuple(equations.table.rows[np.concatenate(whole)].tolist())
 

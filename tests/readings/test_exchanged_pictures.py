@@ -46,9 +46,7 @@ def test_pictures_in_each_others_place_are_named(order: dict[int, int]) -> None:
     assert all(f"{shown} shows {true}" in str(refused.value) for shown, true in order.items())
 
 
-def test_turned_pictures_among_sound_ones_are_not_said_to_be_exchanged() -> (
-    None
-):
+def test_turned_pictures_among_sound_ones_are_not_said_to_be_exchanged() -> None:
     """Two that are upside down are nearer to each other's place than to their own."""
     measured = taken("hexapod", 1000.0, 0.3)
     values = measured.values.copy()
