@@ -35,7 +35,7 @@ from pkmcal.estimation.starts import stated_beside
 from pkmcal.estimation.unlike_components import unlike_components
 from pkmcal.exceptions import ArgumentError, UnreachedError
 from pkmcal.fitted.datum import datum as choose_datum
-from pkmcal.fitted.dropped import are_few, far_off, held_without, robust_outliers, without
+from pkmcal.fitted.dropped import TIMES, are_few, far_off, held_without, robust_outliers, without
 from pkmcal.fitted.fit import Fit
 from pkmcal.fitted.fit_statistics import (
     identifiability,
@@ -219,7 +219,8 @@ def _contradicted(
     others = begin(rows.without(far), chosen, loss)
     there = solved_in_least_minima(estimator_at(*others, loss)).evaluation
     machine = equations.with_parameters(there.parameters).with_exact_actuators()
-    return far_off(equations, in_their_modes(machine, machine.at(there.theta, near=start.states)))
+    there = in_their_modes(machine, machine.at(there.theta, near=start.states))
+    return far_off(equations, there, TIMES)
 
 
 def without_slack(equations: Equations, start: Evaluation) -> tuple[Equations, tuple[Cell, ...]]:

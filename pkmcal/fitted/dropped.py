@@ -24,7 +24,8 @@ Found = Literal["outliers", "slack"]
 Drop = Found | Sequence[int | Found] | None
 FOUND: tuple[Found, ...] = ("outliers", "slack")
 _FEW = 0.25  # share of the rows; where more disagree it is rather units or columns
-_FAR, _TIMES = 0.05, 10.0  # of the largest length, and times the median, by which poses are far off
+_FAR = 0.01  # of the largest length, by which poses are far off
+_SEEM, TIMES = 3.0, 10.0  # times the median, by which they are: before a fit, and by others' fit
 _WANTED = "'outliers', 'slack' or numbers of rows"
 
 
@@ -139,7 +140,7 @@ def are_few(datasets: Sequence[FitData], rows: Sequence[int]) -> bool:
     return bool(whole.mean() <= _FEW and not any(each.all() for each in mine))
 
 
-def far_off(equations: Equations, start: Evaluation) -> tuple[int, ...]:
+def far_off(equations: Equations, start: Evaluation, times: float = _SEEM) -> tuple[int, ...]:
     """Numbers of the rows of poses that contradict their actuators before anything is fitted.
 
     Of poses at which much was read, those that are far off where most are near.
@@ -149,7 +150,7 @@ def far_off(equations: Equations, start: Evaluation) -> tuple[int, ...]:
         return ()
     off = worst_readings(equations, start.residuals)
     usual = float(np.nanmedian(off)) if np.isfinite(off).any() else np.inf
-    odd = np.flatnonzero(off > max(_TIMES * usual, _FAR * equations.size))
+    odd = np.flatnonzero(off > max(times * usual, _FAR * equations.size))
     whole = [np.isin(place, odd) for place in equations.table.pose_of]
     return tuple(equations.table.rows[np.concatenate(whole)].tolist())
 
