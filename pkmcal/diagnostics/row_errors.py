@@ -36,8 +36,8 @@ def contradicting(datasets: Sequence[FitData], rows: Sequence[int]) -> list[str]
     if not are_few(datasets, rows):
         return []
     return [
-        f"{row_names(datasets, rows)}: no pose agrees both with what was read there and with the"
-        " actuators, as of another row's, or of a mirrored picture; leave these rows out with"
+        f"{row_names(datasets, rows)}: what was read there contradicts the actuators, as where they"
+        " are of another row, or a picture is mirrored; leave these rows out with"
         f" {Remedy('drop', 'outliers')}"
     ]
 

@@ -28,7 +28,8 @@ _DRAWN = 5  # pictures of a draw
 _DRAWS = 60
 _ROUNDS = 10  # of choosing and laying in turn
 _GROSS = 0.2  # rad, or share of the distance, beyond which a picture is off and no more
-_ODD, _TIMES = 0.05, 10.0  # the same, and times the median, by which a picture is of another row
+_ODD, _TIMES = 0.02, 10.0  # the same, and times the median, by which a picture is of another row
+_LOOSE = 0.025  # the same, from which places tell whether most pictures are off
 _MOST = 10.0  # times by which a step makes a board smaller
 _LISTED = 6  # pictures
 _ASTRAY = 0.3  # share of the way between pictures, by which most are off their places at most
@@ -69,14 +70,12 @@ def tool_places(
         return np.empty((0, 6))
     places, behind = _agreed(corner, pixel, picture, lens, rides, pose)
     odd = _require_own_poses(places, pose, names)
-    off, astray = _contradictions(places, pose)
-    if off <= _OFF and not astray:
-        return places
+    sound = np.isin(np.arange(len(pose)), odd, invert=True)
+    off, astray = _contradictions(places[sound], pose[sound])
+    if off <= _OFF and not astray:  # the fit names the few that are odd, and can leave them out
+        return np.where(sound[:, None], places, np.nan)
     if len(odd):
-        sound = np.isin(np.arange(len(pose)), odd, invert=True)
-        off_else, astray_else = _contradictions(places[sound], pose[sound])
-        if off_else <= _OFF and not astray_else:  # the fit names the few and can leave them out
-            return np.where(sound[:, None], places, np.nan)
+        off, astray = _contradictions(places, pose)
     mirrored = lens * np.where(np.arange(9) == 7, -1.0, 1.0)  # p2
     across = pixel * [-1, 1] + [2 * lens[2], 0]
     if behind:
@@ -242,7 +241,7 @@ def disagreement(seen: FloatArray, pose: FloatArray) -> float:
 def _contradictions(seen: FloatArray, pose: FloatArray) -> tuple[float, bool]:
     """Return `disagreement` and `_astray`; none of so few pictures that they tell nothing."""
     off = disagreement(seen, pose) if len(pose) > _FEWEST else 0.0
-    return off, off > _ODD / 2.0 and _astray(seen, pose)
+    return off, off > _LOOSE and _astray(seen, pose)
 
 
 def _times_larger(seen: FloatArray, pose: FloatArray) -> float:

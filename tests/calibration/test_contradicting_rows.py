@@ -33,7 +33,7 @@ def test_pictures_that_contradict_all_others_are_named_with_what_leaves_them_out
         checks(mirrored(count, odd))
     text, names = str(error.value), [f"pose {each} ({CORNERS} rows)" for each in odd]
     assert f"{len(odd) * CORNERS} of {count * CORNERS} rows contradict all others" in text
-    assert f"; {', '.join(names)}: no pose agrees both with what was read" in text
+    assert f"; {', '.join(names)}: what was read there contradicts the actuators" in text
     assert "--drop-outliers (drop='outliers')" in text
 
 
