@@ -24,6 +24,7 @@ from pkmcal.statistics.linear_fit import LinearFit
 from pkmcal.statistics.score_test import Beside, beside
 
 _HARMFUL = 0.25  # times its ± by which such errors move a machine; smooth ones do so more
+_ALIKE = 2.3  # deviations: a chance of 1 in 100
 _READINGS = 4  # of a point, from which its own error is told from noise
 _MOST = 400  # points that are tested
 
@@ -65,12 +66,30 @@ def stated_points(found: Solution) -> StatedPoints | None:
     beside_lens = beside(_beside_instruments(found), columns)
     if beside_lens is None or beside_lens.chance >= RARE:
         return None
+    if _alike_everywhere(fit, beside_lens) < _ALIKE:
+        return None
     taken = beside(found.weighed.fit, columns)
     if taken is None:
         return None
     off, errors = _errors(taken)
     moved = fit.parameters.scale[:, None] * taken.fit.back @ taken.by_basis @ errors
     return StatedPoints(noun, count, beside_lens.chance, off, times_stated(fit, moved))
+
+
+def _alike_everywhere(fit: Fit, taken: Beside) -> float:
+    """How alike the errors are that different poses tell, in deviations of what is no error at all.
+
+    Pictures at one pose may share errors of finding corners, which are those of no other pose.
+    """
+    blocks = fit.uncertainty.blocks
+    places = np.unique(blocks.table.actuators, axis=0, return_inverse=True)[1].reshape(-1)
+    place = np.repeat(places[blocks.pose_of_block], blocks.components)
+    told = np.zeros((int(places.max()) + 1, len(taken.along)))
+    np.add.at(told, place, taken.own * taken.fit.residual[:, None])
+    products = told @ told.T
+    np.fill_diagonal(products, 0.0)
+    scatter = np.sqrt(2.0 * np.square(products).sum())
+    return float(products.sum() / scatter) if scatter > 0.0 else 0.0
 
 
 def _beside_instruments(found: Solution) -> LinearFit:

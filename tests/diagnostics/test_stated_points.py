@@ -66,6 +66,21 @@ def test_sound_corners_are_not_doubted(sound: pk.Measurements, seed: int) -> Non
     assert "stated-points" not in said and found.verdict.state == "calibrated"
 
 
+def test_errors_that_pictures_at_one_pose_share_are_none_of_the_board() -> None:
+    """Four pictures at each of eight poses: how corners were found there is repeated with them."""
+    random, base = np.random.default_rng(0), pictures(8)
+    shared = base.values + random.normal(0.0, 0.07, base.values.shape)
+    corner = np.tile(np.asarray(base.instrument.corner), (4, 1))
+    assert base.group is not None
+    repeated = pk.Measurements(
+        np.tile(base.actuators, (4, 1)),
+        np.tile(shared, (4, 1)) + random.normal(0.0, 0.03, (4 * len(base), 2)),
+        replace(base.instrument, corner=corner),
+        group=np.concatenate([base.group + 100 * i for i in range(4)]),
+    )
+    assert "stated-points" not in checks(repeated)[1]
+
+
 @pytest.mark.parametrize("lens", [{"fx": 1530.0, "fy": 1535.0}, {"cx": 655.0}])
 def test_a_lens_that_is_off_is_no_board_that_is(
     sound: pk.Measurements, lens: dict[str, float]
