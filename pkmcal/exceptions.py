@@ -33,7 +33,7 @@ class FitError(ArgumentError):
 
 
 class UnreachedError(FitError):
-    """Some rows at which no pose of the machine agrees with what was read there.
+    """Some rows at which what was read contradicts the actuators: no pose agrees with both.
 
     Attributes
     ----------
