@@ -22,6 +22,7 @@ from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.mode_slips import MOST_ODD
 from pkmcal.estimation.solving import solve
 from pkmcal.kinematics.calibratable import as_parallel
+from pkmcal.kinematics.pose_steps import surplus
 from pkmcal.kinematics.robot import Robot
 
 _ANGLES = POSE[3:]
@@ -49,11 +50,12 @@ def in_least_minima(
 ) -> Evaluation:
     """Evaluate with odd poses where they miss less, if there is such a minimum.
 
-    `noise` (G,) is that of `Equations.at`. The evaluation itself where nothing is found, and where
-    poses have no unknowns.
+    `noise` (G,) is that of `Equations.at`. The evaluation itself where nothing is found, where
+    poses have no unknowns, and of a machine without more actuators than it needs: the modes that
+    these leave are looked for by `mode_slips`.
     """
     robot = as_parallel(equations.parameters.robot)
-    if equations.system is None or robot is None:
+    if equations.system is None or robot is None or not surplus(robot):
         return evaluation
     factors = np.ones(len(equations.blocks.unstated)) if noise is None else noise
     freedom = _freedom(equations)
