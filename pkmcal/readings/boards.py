@@ -134,6 +134,8 @@ class Board:
     def circles(columns: int, rows: int, pitch: float) -> Board:
         """Dots row by row; one at the lower left that is larger tells how the board is turned.
 
+        It is recognised from 1.4 times the diameter of the others on, 1.5 where they are but 5 px.
+
         Parameters
         ----------
         columns, rows : int

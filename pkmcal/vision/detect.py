@@ -34,6 +34,7 @@ from pkmcal.vision.sheet import Panel, draw
 
 _EDGE = 1 / 8  # of a picture, in which corners tell the distortion
 _DARK = 1 / 8  # of the range of a picture, beyond which one that was exposed well has levels
+_LISTED = 6  # pictures
 _TILTED = np.radians(5.0)  # between pictures, of a board that is tilted enough to tell the lens
 
 
@@ -248,11 +249,26 @@ def _remarks(found: Detection, board: Board, tilts: FloatArray, finds: Finder) -
     edge = (pixel < _EDGE * size) | (pixel > (1 - _EDGE) * size)
     if not edge.any():
         yield "no corner is near the edge of a picture: distortion is told badly"
-    if board.kind == "chessboard" and sum(board.shape) % 2 == 0:
+    either = [each.path.name for each in found.taken if each.seen.either]
+    if either and board.kind == "chessboard":
         yield (
             "this chessboard looks alike when it is turned by 180 deg, and corners may be numbered"
             " from either end: print one with an odd and an even side, or a ChArUco board"
         )
+    elif either:
+        yield _without_large_dot(either, len(found.taken))
+
+
+def _without_large_dot(names: Sequence[str], count: int) -> str:
+    """Say that dots may be numbered from either end in pictures of these names."""
+    which = ", ".join(map(printable, names[:_LISTED])) + " …" * (len(names) > _LISTED)
+    some = "" if len(names) == count else f" ({which})"
+    return (
+        f"in {len(names)} of {count} pictures no dot at the lower left is seen to be larger than"
+        f" the others{some}: the board looks alike when it is turned by 180 deg, and dots may be"
+        " numbered from either end: print that dot 1.7 times as large as the others, as pkmcal"
+        " board does, or a ChArUco board"
+    )
 
 
 def _tilts(normals: FloatArray) -> tuple[FloatArray, float]:

@@ -21,7 +21,7 @@ from pkmcal.readings.boards import Board
 
 _WINDOW = 5  # half the side of the square in which a corner is refined, px
 _SHARE = 0.25  # of the way to the next corner that it may reach
-_LARGER = 1.4  # than its neighbours, of a dot that tells how the board is turned
+_LARGER = 1.25  # times its neighbours, of a dot that tells how the board is turned; others: 1.1
 # Each holds its smaller ones; the least of AprilTags is found in noise.
 _FAMILIES = (
     "4X4_1000", "5X5_1000", "6X6_1000", "7X7_1000", "ARUCO_ORIGINAL", "APRILTAG_25h9",
@@ -42,11 +42,14 @@ class Seen(NamedTuple):
         Where they are.
     strange : int
         Markers of the board's dictionary that it does not have.
+    either : bool
+        Whether corners may be counted from either end: it looks alike turned by 180 degrees.
     """
 
     ids: Int64Array
     pixel: FloatArray
     strange: int = 0
+    either: bool = False
 
 
 NOTHING = Seen(np.empty(0, dtype=np.int64), np.empty((0, 2)))
@@ -119,7 +122,7 @@ def charuco_board(board: Board) -> Any:
 
 def _chessboard(board: Board) -> Finder:
     cv2, (columns, rows) = opencv(), board.shape
-    cells = _centres_of_squares(columns, rows)
+    cells, alike = _centres_of_squares(columns, rows), (columns + rows) % 2 == 0
 
     def found(grey: Any) -> Seen:
         ok, corners = cv2.findChessboardCorners(grey, board.shape)
@@ -128,9 +131,9 @@ def _chessboard(board: Board) -> Finder:
         if not ok:
             return NOTHING
         pixel = _refined(grey, corners.reshape(-1, 2))
-        if (columns + rows) % 2 and _is_turned(grey, board, pixel, cells):
+        if not alike and _is_turned(grey, board, pixel, cells):
             pixel = pixel[::-1].copy()
-        return Seen(board.ids.copy(), pixel)
+        return Seen(board.ids.copy(), pixel, either=alike)
 
     return found
 
@@ -217,13 +220,17 @@ def _circles(board: Board) -> Finder:
         points = blobs.detect(grey)
         place, size = np.array([p.pt for p in points]), np.array([p.size for p in points])
         own = np.linalg.norm(grid[:, :, None] - place, axis=3).argmin(axis=2)
-        return Seen(board.ids.copy(), _large_dot_low(grid, size[own]).reshape(-1, 2))
+        grid, told = _large_dot_low(grid, size[own])
+        return Seen(board.ids.copy(), grid.reshape(-1, 2), either=not told)
 
     return found
 
 
-def _large_dot_low(grid: FloatArray, size: FloatArray) -> FloatArray:
-    """The grid (rows, columns, 2) turned so that a dot at a corner that is larger is lower left."""
+def _large_dot_low(grid: FloatArray, size: FloatArray) -> tuple[FloatArray, bool]:
+    """Turn the grid (rows, columns, 2) to have a dot at a corner that is larger lower left.
+
+    Returns whether there is one.
+    """
     along, down = grid[0, -1] - grid[0, 0], grid[-1, 0] - grid[0, 0]
     if along[0] * down[1] < along[1] * down[0]:  # counted upwards
         grid, size = grid[::-1], size[::-1]
@@ -231,7 +238,8 @@ def _large_dot_low(grid: FloatArray, size: FloatArray) -> FloatArray:
     turned = [(np.rot90(grid, way), np.rot90(size, way)) for way in ways]
     larger = [dots[-1, 0] / np.median([dots[-2, 0], dots[-1, 1]]) for _, dots in turned]
     best = int(np.argmax(larger))
-    return turned[best][0] if larger[best] > _LARGER else grid
+    told = bool(larger[best] > _LARGER)
+    return (turned[best][0] if told else grid), told
 
 
 def _refined(grey: Any, pixel: Any, share: float = _SHARE) -> FloatArray:

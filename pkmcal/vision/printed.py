@@ -15,6 +15,7 @@ from pkmcal.vision.detectors import charuco_board, dictionary, opencv
 
 _WHITE = 255
 _PER_MM = 20  # pixels, of a file
+_LARGE = 1.7  # times the diameter of the other dots
 _ONE_INCH = 25.4  # mm
 
 
@@ -96,10 +97,10 @@ def _tags(board: Board, per_mm: float) -> Any:
 
 
 def _dots(board: Board, per_mm: float) -> Any:
-    """Dots of half the pitch, the one at the lower left of 0.85 of it, one pitch from the edges."""
+    """Dots of half the pitch, the one at the lower left larger, one pitch from the edges."""
     (columns, rows), pitch = board.shape, board.sizes[0] * per_mm
     y, x = np.mgrid[: round((rows + 1) * pitch), : round((columns + 1) * pitch)] + 0.5
     column, row = (np.clip(np.round(each / pitch), 1, n) for each, n in ((x, columns), (y, rows)))
-    across = np.where((column == 1) & (row == rows), 0.85, 0.5) * pitch
+    across = np.where((column == 1) & (row == rows), _LARGE, 1.0) * pitch / 2
     black = np.hypot(x - column * pitch, y - row * pitch) < across / 2
     return np.where(black, 0, _WHITE)

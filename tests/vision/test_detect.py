@@ -145,6 +145,23 @@ def test_a_chessboard_upside_down_keeps_the_numbers_of_its_corners(tmp_path: Pat
     assert "turned by 180" in str(pk.detect(tmp_path / "alike.png", alike))
 
 
+@pytest.mark.parametrize("times", [1.0, 1.4])
+def test_dots_of_which_none_is_seen_to_be_larger_are_said_to_be_numbered_from_either_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, times: float
+) -> None:
+    """One that is 1.4 times as large as the others tells; pkmcal prints it 1.7 times as large."""
+    board = Board.circles(8, 5, 20)
+    (first,) = poses(1, board, tilt=20.0)
+    half = np.diag([-1.0, -1, 1, 1])
+    half[:2, 3] = 2 * board.places.mean(axis=0)[:2]
+    motions = np.stack([first, first @ half])
+    monkeypatch.setattr("pkmcal.vision.printed._LARGE", times)
+    found = pk.detect(taken(tmp_path / "p", board, motions), board)
+    said = "in 2 of 2 pictures no dot at the lower left" in str(found)
+    assert said == (times == 1.0) and len(found.taken) == 2
+    assert said or np.abs(off(found, motions)).max() < 0.5
+
+
 def test_bad_pictures_are_named_with_the_reason(
     tmp_path: Path, charuco: tuple[Path, np.ndarray]
 ) -> None:
