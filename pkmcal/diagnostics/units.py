@@ -57,9 +57,10 @@ def likely_unit_errors(
         present = together(off)
         if present <= least * size:
             continue
+        others = dict(other_readings(data.measured, parameters.robot.actuator_units))
         trials = {
             meant: (_read_as(replace(data, measured=other), parameters, near, read), shrunk)
-            for meant, other in other_readings(data.measured, parameters.robot.actuator_units)
+            for meant, other in others.items()
             if (shrunk := _shrunk(data.measured, other)) > 0.0
         }
         # smaller numbers misfit by less, whatever they mean: a machine without lengths fits any
@@ -68,7 +69,11 @@ def likely_unit_errors(
         lowest = min(misfit.values())
         meant = next(each for each in trials if misfit[each] <= lowest * (1.0 + TIED))
         most = GROSS * size if evaluation is None else MISFIT_RATIO * present
-        if misfit[meant] < most and _better_where_reached(trials[meant][0], off):
+        if (
+            misfit[meant] < most
+            and _better_where_reached(trials[meant][0], off)
+            and _doubts(others[meant]) <= _doubts(data.measured)
+        ):
             which = f"measurements {i + 1}: " if len(datasets) > 1 else ""
             where = (
                 f"off by {present:.3g} mm" if np.isfinite(present) else "out of the machine's reach"
@@ -112,6 +117,11 @@ def _misfits(residual: FloatArray, measured: Measurements, robot: Calibratable) 
     """Residual of each row, mm; angles as their arc. NaN if the row is not reached."""
     off: FloatArray = np.linalg.norm(residual * compared_by(robot, measured), axis=1)
     return off
+
+
+def _doubts(measured: Measurements) -> int:
+    """How much is wrong by the readings themselves, as pictures that show a board from behind."""
+    return sum(1 for _ in measured.instrument.doubts(measured))
 
 
 def _together(off: FloatArray) -> float:

@@ -19,9 +19,11 @@ from pkmcal.exceptions import ArgumentError, FitError
 from pkmcal.readings import orientation, twists
 from pkmcal.readings.board_poses import board_poses, facing, pictures_told, summed
 from pkmcal.readings.hand_eye import of_frame_and_tool
+from pkmcal.readings.numberings import across, half_turn
 
 _FEWEST = 4  # pictures, more of which tell that they are mirrored
 _OFF, _FALLS = 0.1, 3.0  # rad by which mirrored pictures are off, and how many times less mirrored
+_MIRRORED = "with left and right exchanged"
 _STRANGE = 0.05  # of the extent of a board in a picture, by which its corners are off at most
 _MANY = 8  # corners of a picture that says whether it shows the board
 _DRAWN = 5  # pictures of a draw
@@ -64,7 +66,8 @@ def tool_places(
     Raises
     ------
     ValueError
-        The pictures are mirrored, exchanged, or do not belong to these poses.
+        The pictures are mirrored, exchanged, numbered from either end, or do not belong to these
+        poses.
     """
     if not len(pose):
         return np.empty((0, 6))
@@ -76,21 +79,24 @@ def tool_places(
         return np.where(sound[:, None], places, np.nan)
     if len(odd):
         off, astray = _contradictions(places, pose)
-    mirrored = lens * np.where(np.arange(9) == 7, -1.0, 1.0)  # p2
-    across = pixel * [-1, 1] + [2 * lens[2], 0]
+    mirrored = across(pixel, lens[2]), picture, lens * np.where(np.arange(9) == 7, -1.0, 1.0)  # p2
     if behind:
-        other, _ = _agreed(corner, across, picture, mirrored, rides, pose)
+        other, _ = _agreed(corner, *mirrored, rides, pose)
         otherwise = disagreement(other, pose)
         if otherwise * _FALLS < off:
             raise ArgumentError(
                 f"measurements: the pictures are mirrored: where they show the board differs by"
                 f" {np.degrees(off):.2g} deg from how the machine moves, and by"
-                f" {np.degrees(otherwise):.2g} deg with left and right exchanged; take"
+                f" {np.degrees(otherwise):.2g} deg {_MIRRORED}; take"
                 " pictures without mirroring, or state u as the width less 1 less u"
             )
     many = np.bincount(picture) >= _MANY
     if many.sum() <= _FEWEST or not (astray or disagreement(places[many], pose[many]) > _OFF):
         return places
+    half = half_turn(corner)
+    if half is not None:
+        laid, turned = _numbered(corner, pixel, picture, lens, rides, pose, half)
+        _require_one_numbering(off, disagreement(laid, pose), turned, names)
     trials = {"with the camera on the other of base and platform": (not rides, pose)}
     for how, rows in (("next", 1), ("previous", -1)):
         trials[f"with the actuators of the {how} picture"] = rides, np.roll(pose, -rows, axis=0)
@@ -101,8 +107,18 @@ def tool_places(
     times = _times_larger(places, pose)
     larger = places * np.repeat([times, 1.0], 3)
     found[f"with a board {times:.4g} times as large"] = disagreement(larger, pose)
+    if half is not None:
+        laid, _ = _numbered(across(corner, half[0] / 2), *mirrored, rides, pose, half)
+        found[_MIRRORED] = disagreement(laid, pose)
     how = min(found, key=lambda each: found[each])
     fits = found[how] * _FALLS < off
+    if how == _MIRRORED and fits and found[how] <= _OFF:  # from the front, or it had been behind
+        raise FitError(
+            "the pictures are mirrored, or actuators are exchanged of a machine that is its own"
+            f" mirror image: where pictures show the board differs by {np.degrees(off):.2g} deg"
+            f" from how the machine moves, and by {np.degrees(found[how]):.2g} deg {how}; take"
+            " pictures without mirroring, or mirror them and find corners again"
+        )
     if fits or off > _GROSS or astray:
         better = f", and by {np.degrees(found[how]):.2g} deg {how}" if fits else ""
         if len(odd):
@@ -168,13 +184,40 @@ def _agreed(
     pose: FloatArray,
 ) -> tuple[FloatArray, bool]:
     """Return `tool_places`, and whether most pictures show the board from behind."""
+    seen, behind = _seen(corner, pixel, picture, lens)
+    return in_agreement(_of_tool(seen, rides), pose), behind
+
+
+def _numbered(
+    corner: FloatArray,
+    pixel: FloatArray,
+    picture: IntArray,
+    lens: FloatArray,
+    rides: bool,
+    pose: FloatArray,
+    half: FloatArray,
+) -> tuple[FloatArray, IntArray]:
+    """Return `tool_places`, each numbered from the end that fits, and the fewer of one end."""
+    seen, _ = _seen(corner, pixel, picture, lens)
+    turned = compose(seen.reshape(-1, 6), half).reshape(seen.shape)
+    either = _of_tool(np.stack([seen, turned], axis=2).reshape(len(seen), 4, 6), rides)
+    chosen = _chosen(either, pose)
+    ends = [np.flatnonzero(chosen % 2 == end) for end in (1, 0)]
+    return _taken(either, chosen), min(ends, key=len)
+
+
+def _seen(
+    corner: FloatArray, pixel: FloatArray, picture: IntArray, lens: FloatArray
+) -> tuple[FloatArray, bool]:
+    """Places (P, 2, 6) of the board in axes of the camera, and whether most show its back."""
     boards = board_poses(corner, pixel, lens, picture)
     _require_the_board(pixel, picture, boards.rms[:, 0])
-    seen = np.where(boards.possible[:, :, None], boards.pose, np.nan)
     behind = bool(np.median(facing(boards)) < 0.0)
-    if rides:
-        seen = twists.inverse(seen.reshape(-1, 6)).reshape(seen.shape)
-    return in_agreement(seen, pose), behind
+    return np.where(boards.possible[:, :, None], boards.pose, np.nan), behind
+
+
+def _of_tool(seen: FloatArray, rides: bool) -> FloatArray:
+    return twists.inverse(seen.reshape(-1, 6)).reshape(seen.shape) if rides else seen
 
 
 def _require_the_board(pixel: FloatArray, picture: IntArray, off: FloatArray) -> None:
@@ -202,16 +245,23 @@ def in_agreement(seen: FloatArray, pose: FloatArray) -> FloatArray:
 
     The second place is NaN where there is but one.
     """
-    doubtful: BoolArray = np.asarray(np.isfinite(seen[:, 1]).all(axis=1))
+    return _taken(seen, _chosen(seen, pose))
+
+
+def _chosen(seen: FloatArray, pose: FloatArray) -> IntArray:
+    """Which (P,) of places (P, k, 6) agree: those of the second half may be NaN."""
+    possible: BoolArray = np.asarray(np.isfinite(seen).all(axis=2))
+    half = seen.shape[1] // 2
     chosen = np.zeros(len(seen), dtype=np.intp)
-    if not doubtful.any() or len(seen) < 3:
-        return _taken(seen, chosen)
+    if not possible[:, 1:].any() or len(seen) < 3:
+        return chosen
     random, known = np.random.default_rng(0), set[bytes]()
     best, least = chosen, np.inf
     for draw in range(_DRAWS):
         if draw:
             some = random.permutation(len(seen))[:_DRAWN]
-            sides = random.integers(2, size=len(some)) * doubtful[some]
+            sides = random.integers(seen.shape[1], size=len(some))
+            sides -= half * ~possible[some, sides]
             off = _misfits(seen, pose, some, sides)
             chosen = np.nanargmin(off, axis=1)
         for _ in range(_ROUNDS):
@@ -225,7 +275,7 @@ def in_agreement(seen: FloatArray, pose: FloatArray) -> FloatArray:
         misfit = float(np.minimum(np.nanmin(off, axis=1), _GROSS).sum())
         if misfit < least:
             best, least = chosen, misfit
-    return _taken(seen, best)
+    return best
 
 
 def disagreement(seen: FloatArray, pose: FloatArray) -> float:
@@ -236,6 +286,22 @@ def disagreement(seen: FloatArray, pose: FloatArray) -> float:
     every = np.arange(len(seen))
     off = _misfits(seen[:, None], pose, every, np.zeros_like(every))
     return float(np.nanmedian(off)) if np.isfinite(off).any() else np.inf
+
+
+def _require_one_numbering(
+    off: float, otherwise: float, turned: IntArray, names: Sequence[str]
+) -> None:
+    """Refuse pictures of which some number the corners of a board from its other end."""
+    if len(turned) and otherwise <= _OFF and otherwise * _FALLS < off:
+        which = ", ".join(names[i] for i in turned[:_LISTED]) + " …" * (len(turned) > _LISTED)
+        raise ArgumentError(
+            f"measurements: {len(turned)} of {len(names)} pictures number corners from the other"
+            " end of the board than the rest, for it looks alike when it is turned by 180 deg:"
+            f" {which}; where pictures show the board differs by {np.degrees(off):.2g} deg from how"
+            f" the machine moves, and by {np.degrees(otherwise):.2g} deg with these turned: number"
+            " their corners from the other end, or print a ChArUco board, a chessboard with an odd"
+            " and an even side, or dots of which one is larger"
+        )
 
 
 def _contradictions(seen: FloatArray, pose: FloatArray) -> tuple[float, bool]:

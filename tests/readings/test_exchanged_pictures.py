@@ -64,5 +64,33 @@ def test_a_motion_that_is_mirrored_is_refused_of_a_machine_that_does_not_turn() 
     measured = taken("linear-delta", 480.0, 0.9)
     placed(measured, "linear-delta")
     exchanged = replace(measured, actuators=measured.actuators[:, [0, 2, 1]])
-    with pytest.raises(pk.ArgumentError, match="differs by"):
+    with pytest.raises(pk.ArgumentError, match="are mirrored, or actuators are exchanged"):
         placed(exchanged, "linear-delta")
+
+
+@pytest.mark.parametrize("count", [5, 8, 11])
+def test_pictures_that_are_numbered_from_the_other_end_are_named(count: int) -> None:
+    """As of a chessboard that looks alike when it is turned; the fewer of two kinds are named."""
+    measured, corners = taken("hexapod", 1000.0, 0.3), len(BOARD.ids)
+    random = np.random.default_rng(count)
+    turned = np.sort(random.permutation(COUNT)[:count])
+    values = measured.values.reshape(COUNT, corners, 2).copy()
+    values[turned] = values[turned, ::-1]
+    with pytest.raises(pk.ArgumentError, match="from the other end") as refused:
+        placed(replace(measured, values=values.reshape(-1, 2)))
+    fewer = turned if count <= COUNT / 2 else np.setdiff1d(np.arange(COUNT), turned)
+    assert f"{len(fewer)} of {COUNT} pictures" in str(refused.value)
+    assert count == COUNT / 2 or f": {', '.join(map(str, fewer))};" in str(refused.value)
+
+
+def test_mirrored_pictures_of_a_board_that_is_its_own_mirror_image_are_named() -> None:
+    """Their corners are numbered as if they were seen from the front."""
+    measured = taken("hexapod", 1000.0, 0.3)
+    columns, rows = BOARD.shape
+    values = measured.values.reshape(COUNT, rows, columns, 2)[:, :, ::-1] * [-1, 1] + [1280, 0]
+    mirrored = replace(measured, values=values.reshape(-1, 2))
+    with pytest.raises(pk.ArgumentError, match="the pictures are mirrored") as refused:
+        pk.identify(pk.load("hexapod"), mirrored, ["base*"], unknown=["frame", "target"])
+    assert " if " not in str(
+        refused.value
+    )  # nor u and v said to be exchanged: the board turns over
