@@ -87,8 +87,9 @@ FromPnp = Annotated[
         " pictures (PnP). The focal length in px and the size of the board in mm tell how accurate"
         " a pose is in each direction. middle=XxY is the middle of the board on it: half the size"
         " where poses are of its corner, 0x0 where they are of its middle; a camera that was"
-        " pointed at it tells that. noise=PX is the noise of a corner; without it it is"
-        " estimated. --camera-on says what the camera is fixed to.",
+        " pointed at it tells that. noise=PX is the noise of a corner, of which corners=N were"
+        " seen, or 25 where nothing says it; without a noise it is estimated. --camera-on says what"
+        " the camera is fixed to.",
     ),
 ]
 ProbeOffset = Annotated[

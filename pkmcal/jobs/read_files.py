@@ -87,7 +87,9 @@ def read_file(
         return measured
     try:
         mount = word("--camera-on", reading.camera_on, get_args(Mount))
-        return from_pnp(measured, pnp.focal, pnp.board, on=mount, noise=pnp.noise or 1.0)
+        return from_pnp(
+            measured, pnp.focal, pnp.board, on=mount, noise=pnp.noise or 1.0, corners=pnp.corners
+        )
     except ArgumentError as error:
         raise ArgumentError(f"--from-pnp: {path}: {error}") from None
 
@@ -103,15 +105,18 @@ class Pnp(NamedTuple):
         Width and height, mm; then x and y of its middle, where they are stated.
     noise : float or None
         Of corners, px; None: to be estimated.
+    corners : int or None
+        How many the board has; None: nobody says.
     """
 
     focal: float
     board: tuple[float, ...]
     noise: float | None
+    corners: int | None
 
 
 def read_pnp(text: str) -> Pnp:
-    """Read ``f=640,board=160x120[,middle=80x60][,noise=0.3]``.
+    """Read ``f=640,board=160x120[,middle=80x60][,corners=35][,noise=0.3]``.
 
     Raises
     ------
@@ -119,23 +124,24 @@ def read_pnp(text: str) -> Pnp:
         Anything else.
     """
     expected = ArgumentError(
-        f"--from-pnp {text}: expected f=FOCAL,board=WIDTHxHEIGHT[,middle=XxY][,noise=PX],"
-        " as f=640,board=160x120,middle=80x60: px and mm"
+        f"--from-pnp {text}: expected f=FOCAL,board=WIDTHxHEIGHT[,middle=XxY][,corners=N]"
+        "[,noise=PX], as f=640,board=160x120,middle=80x60: px and mm"
     )
     parts = dict(map(named, text.split(",")))
-    if not {"f", "board"} <= parts.keys() <= {"f", "board", "middle", "noise"}:
+    if not {"f", "board"} <= parts.keys() <= {"f", "board", "middle", "corners", "noise"}:
         raise expected
     try:
         width, height = map(typed, parts["board"].lower().split("x"))
         middle = [*map(typed, parts["middle"].lower().split("x"))] if "middle" in parts else []
         focal, noise = typed(parts["f"]), typed(parts["noise"]) if "noise" in parts else None
+        corners = int(parts["corners"]) if "corners" in parts else None
     except ValueError:
         raise expected from None
     if len(middle) not in (0, 2):
         raise expected
     if not min(width, height, focal, 1.0 if noise is None else noise) > 0.0:
         raise ArgumentError(f"--from-pnp {text}: focal length, size and noise must be above 0")
-    return Pnp(focal, (width, height, *middle), noise)
+    return Pnp(focal, (width, height, *middle), noise, corners)
 
 
 def cameras(reading: Reading) -> list[Camera]:

@@ -124,6 +124,22 @@ def test_a_stand_in_of_the_same_size_weighs_as_the_board_does() -> None:
     assert 1.0 < ratio[0] < 2.0  # it has half as many corners
 
 
+@pytest.mark.parametrize(
+    "board", [BOARD, Board.points([0, 1, 2, 3], [[0, 0, 0], [90, 0, 0], [90, 80, 0], [0, 80, 0]])]
+)
+def test_a_size_with_the_number_of_corners_is_as_good_as_the_board(board: Board) -> None:
+    poses = of_pictures(pictures(0, 8)[1])
+    size = np.ptp(board.places[:, :2], axis=0)
+    whole = pk.from_pnp(poses, FOCAL, board).sigma
+    stated = pk.from_pnp(poses, FOCAL, (*size, *size / 2), corners=len(board.ids)).sigma
+    np.testing.assert_allclose(stated, whole, rtol=1e-6, atol=1e-9)
+    many = pk.from_pnp(poses, FOCAL, (*size, *size / 2), corners=4000).sigma
+    assert whole is not None and many is not None
+    deviations = [np.sqrt(np.diagonal(s, axis1=1, axis2=2)) for s in (whole, many)]
+    ratio = np.median(deviations[0] / deviations[1]) / np.sqrt(4000 / len(board.ids))
+    assert 0.5 < ratio < 1.1  # corners at the edge alone tell more, each
+
+
 def test_the_middle_of_a_stand_in_counts_and_is_asked_for_where_nothing_tells_it() -> None:
     """A camera beside the machine is pointed at no point of the board: it says so."""
     true, measured = pictures(2)
@@ -170,6 +186,8 @@ def test_a_camera_that_is_pointed_at_the_board_tells_its_middle() -> None:
         ({"noise": -1.0}, "noise must be above 0"),
         ({"board": (10.0, 0.0)}, "width and height"),
         ({"on": "table"}, "on"),
+        ({"corners": 3}, "corners must be a whole number from 4"),
+        ({"corners": 50, "board": BOARD}, "a Board has its own"),
     ],
 )
 def test_what_does_not_fit_is_refused(change: dict[str, Any], message: str) -> None:
@@ -195,7 +213,11 @@ def test_a_table_of_poses_is_calibrated_by_one_command(
     poses.write(tmp_path / "pnp.csv")
     command = ("calibrate", "hexapod", tmp_path / "pnp.csv", "--free", ",".join(FREE))
     result = run(
-        *command, "--datum", "auto", "--from-pnp", f"f={FOCAL:g},board=180x80,middle=90x40"
+        *command,
+        "--datum",
+        "auto",
+        "--from-pnp",
+        f"f={FOCAL:g},board=180x80,middle=90x40,corners=50",
     )
     assert result.exit_code == 0, result.output
     assert "chi²/dof 1.0" in result.stdout and "tool.alpha" in result.stdout
@@ -205,5 +227,6 @@ def test_a_table_of_poses_is_calibrated_by_one_command(
         "f=100,board=10",
         "f=1,board=1x1,size=3",
         "f=1,board=1x1,middle=3",
+        "f=1,board=1x1,corners=3.5",
     ):
         assert run(*command, "--from-pnp", text).exit_code == 2
