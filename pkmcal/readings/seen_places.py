@@ -27,7 +27,7 @@ _MIRRORED = "with left and right exchanged"
 _STRANGE = 0.05  # of the extent of a board in a picture, by which its corners are off at most
 _MANY = 8  # corners of a picture that says whether it shows the board
 _DRAWN = 5  # pictures of a draw
-_DRAWS = 60
+_DRAWS, _FEW_DRAWS = 60, 20  # the latter where nothing but the cause hangs on them
 _ROUNDS = 10  # of choosing and laying in turn
 _GROSS = 0.2  # rad, or share of the distance, beyond which a picture is off and no more
 _ODD, _TIMES = 0.02, 10.0  # the same, and times the median, by which a picture is of another row
@@ -201,7 +201,7 @@ def _numbered(
     seen, _ = _seen(corner, pixel, picture, lens)
     turned = compose(seen.reshape(-1, 6), half).reshape(seen.shape)
     either = _of_tool(np.stack([seen, turned], axis=2).reshape(len(seen), 4, 6), rides)
-    chosen = _chosen(either, pose)
+    chosen = _chosen(either, pose, _FEW_DRAWS)
     ends = [np.flatnonzero(chosen % 2 == end) for end in (1, 0)]
     return _taken(either, chosen), min(ends, key=len)
 
@@ -248,7 +248,7 @@ def in_agreement(seen: FloatArray, pose: FloatArray) -> FloatArray:
     return _taken(seen, _chosen(seen, pose))
 
 
-def _chosen(seen: FloatArray, pose: FloatArray) -> IntArray:
+def _chosen(seen: FloatArray, pose: FloatArray, draws: int = _DRAWS) -> IntArray:
     """Which (P,) of places (P, k, 6) agree: those of the second half may be NaN."""
     possible: BoolArray = np.asarray(np.isfinite(seen).all(axis=2))
     half = seen.shape[1] // 2
@@ -257,7 +257,7 @@ def _chosen(seen: FloatArray, pose: FloatArray) -> IntArray:
         return chosen
     random, known = np.random.default_rng(0), set[bytes]()
     best, least = chosen, np.inf
-    for draw in range(_DRAWS):
+    for draw in range(draws):
         if draw:
             some = random.permutation(len(seen))[:_DRAWN]
             sides = random.integers(seen.shape[1], size=len(some))
