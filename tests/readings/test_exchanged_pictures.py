@@ -13,13 +13,13 @@ from pkmcal.readings import Board, Camera
 BOARD, COUNT = Board.chessboard(5, 4, 30), 16
 
 
-def taken(machine: str, above: float, share: float) -> pk.Measurements:
+def taken(machine: str, above: float, share: float, cy: float = 400.0) -> pk.Measurements:
     robot = pk.load(machine)
     names = robot.geometry.match(["base*", "offset*"])
     random = np.random.default_rng(3)
     true = robot.replace({n: robot.geometry[n] + random.normal(0.0, 0.3) for n in names})
     camera = Camera(
-        fx=1500.0, fy=1500.0, cx=640.0, cy=400.0,
+        fx=1500.0, fy=1500.0, cx=640.0, cy=cy,
         stands=[0, 0, robot.home[2] + above, np.pi, 0.1, 0.2],
         carried=[-60, -45, 20, np.pi, 0, 0.3],
     )  # fmt: skip
@@ -85,7 +85,7 @@ def test_pictures_that_are_numbered_from_the_other_end_are_named(count: int) -> 
 
 def test_mirrored_pictures_of_a_board_that_is_its_own_mirror_image_are_named() -> None:
     """Their corners are numbered as if they were seen from the front."""
-    measured = taken("hexapod", 1000.0, 0.3)
+    measured = taken("hexapod", 1000.0, 0.3, cy=640.0)
     columns, rows = BOARD.shape
     values = measured.values.reshape(COUNT, rows, columns, 2)[:, :, ::-1] * [-1, 1] + [1280, 0]
     mirrored = replace(measured, values=values.reshape(-1, 2))
