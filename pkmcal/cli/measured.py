@@ -74,7 +74,7 @@ InvertPoses = Annotated[
         "--invert-poses",
         rich_help_panel=READING,
         help="Poses are those of the base in the platform's frame: a camera on the platform saw a"
-        " board on the base.",
+        " board on the base. With --from-pnp: they are those of the camera in axes of the board.",
     ),
 ]
 FromPnp = Annotated[

@@ -75,6 +75,9 @@ def read_file(
     if reading.invert_poses:
         stated["invert_poses"] = True
     pnp = None if reading.from_pnp is None else read_pnp(reading.from_pnp)
+    mount = word("--camera-on", reading.camera_on, get_args(Mount))
+    if pnp is not None:
+        stated["on"] = mount
     if reading.probe_offset is not None:
         stated["probe_offset"] = _offset(reading.probe_offset)
     log = None if reading.controller is None else inputs.file(reading.controller)
@@ -86,7 +89,6 @@ def read_file(
     if pnp is None:
         return measured
     try:
-        mount = word("--camera-on", reading.camera_on, get_args(Mount))
         return from_pnp(
             measured, pnp.focal, pnp.board, on=mount, noise=pnp.noise or 1.0, corners=pnp.corners
         )

@@ -29,7 +29,7 @@ class Reading(Stated):
     units, rotation, probe_offset : str or None
         Units of columns without one, order of angles, the probe's place.
     invert_poses : bool
-        Whether poses are those of the base.
+        Whether poses are those of the base; with `from_pnp` those of the camera.
     from_pnp : str or None
         Poses are those of a board that other software found in pictures: "f=640,board=160x120".
     camera, board : tuple of str

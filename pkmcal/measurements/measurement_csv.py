@@ -123,6 +123,7 @@ def read_measurements(
     units: str | Sequence[str] = (),
     rotation: str | None = None,
     invert_poses: bool = False,
+    on: str = "base",
     probe_offset: ArrayLike | None = None,
     kind: Reading | None = None,
 ) -> Measurements:
@@ -162,6 +163,10 @@ def read_measurements(
     invert_poses : bool
         Poses, or orientations, are those of the base in the platform's frame, as a camera on the
         platform sees a board on the base: they are turned round, a stated sigma with them.
+    on : {"base", "platform"}
+        Of poses for `from_pnp`: what the camera is fixed to that saw the board. Those of a camera
+        on the platform are of the board in its axes, and stay so; where they are those of the
+        camera in axes of the board, `invert_poses` turns them round.
     probe_offset : (3,) array
         Of a column ``probe``: the firmware's offsets of the probe, mm, as in `probed`; by default
         those of the robot file.
@@ -195,6 +200,7 @@ def read_measurements(
         raise ArgumentTypeError(
             f"robot must be a Robot or SerialArm, found {arguments.shown(robot)}"
         )
+    from_platform = arguments.word("on", on, ("base", "platform")) == "platform"
     how = layout(ignore, rename, header, units)
     joints: Sequence[str] = getattr(robot, "actuator_names", None) or ()
     table = _table(path, controller, join, how, joints)
@@ -221,8 +227,8 @@ def read_measurements(
     if several:
         actuators, values, fields = read_several(table, several, actuators, fields, points)
     else:
-        nominal = partial(_nominal, robot, actuators, invert_poses)
-        values = _read_values(table, read, checked_rotation(rotation), nominal)
+        nominal = partial(_nominal, robot, actuators, invert_poses is not from_platform)
+        values = _read_values(table, read, checked_rotation(rotation), nominal, invert_poses)
         read, targets = read_targets(table, read, readings)
         fields |= targets
     try:
@@ -338,6 +344,7 @@ def _read_values(
     read: Reading,
     rotation: str | None,
     nominal: Callable[[], FloatArray | None],
+    inverts: bool,
 ) -> FloatArray | None:
     """Read the values, (N, k) or (N,); None without their columns."""
     form = orientation_in(table.columns)
@@ -346,7 +353,8 @@ def _read_values(
         places = [table.numbers(*each)[0] for each in read.components[: read.turning]]
         from pkmcal.measurements import orientation_forms  # imports SciPy
 
-        return np.column_stack([*places, orientation_forms.read(table, rotation, nominal())])
+        turned = orientation_forms.read(table, rotation, nominal(), inverts)
+        return np.column_stack([*places, turned])
     columns = [table.numbers(*each, blank=True)[0] for each in read.columns_read(table)]
     if not columns:
         return None

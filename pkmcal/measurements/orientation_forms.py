@@ -30,10 +30,13 @@ _ROUNDED = 1e-9  # rad
 _MOST = 3  # conventions that are named
 _FITS = np.radians(3.0)  # what errors of a machine do not turn it by
 _BETTER = 0.2  # of the misfit that another convention may leave to be named
+_TURNED = ("--invert-poses", "without --invert-poses")  # where that was not asked for, or was
 _ABSURD = np.radians(20.0)  # from which orientations are of another machine, or of other rows
 
 
-def read(table: Table, rotation: str | None, nominal: FloatArray | None) -> FloatArray:
+def read(
+    table: Table, rotation: str | None, nominal: FloatArray | None, inverts: bool = False
+) -> FloatArray:
     """Angles α β γ (N, 3) of orientations in any other form.
 
     Parameters
@@ -44,6 +47,8 @@ def read(table: Table, rotation: str | None, nominal: FloatArray | None) -> Floa
         How they are stated, where headings do not say.
     nominal : ndarray (N, 3) or None
         α β γ of the machine as it is described, NaN where it has no pose: tells conventions apart.
+    inverts : bool
+        Whether they will be turned round, as was asked for; `nominal` is turned round already.
 
     Raises
     ------
@@ -55,11 +60,11 @@ def read(table: Table, rotation: str | None, nominal: FloatArray | None) -> Floa
     forms = _forms(names, given)
     said = " ".join(repr(table.columns[name].name) for name in names)
     if rotation is None and len(forms) > 1:
-        rotation = _told_by(table, said, forms, nominal)
+        rotation = _told_by(table, said, forms, nominal, inverts)
     chosen = _chosen(table, said, forms, rotation)
     turns = forms[chosen]
     if nominal is not None:
-        others = _inverted(chosen, turns) | _in_sequence(names, given)
+        others = _inverted(chosen, turns, inverts) | _in_sequence(names, given)
         _refuse_wrong(table, said, chosen, forms | others, nominal)
     angles: FloatArray = turns.as_euler("xyz")
     return angles
@@ -105,7 +110,11 @@ def _forms(names: Sequence[str], given: FloatArray) -> dict[str, Rotation]:
 
 
 def _told_by(
-    table: Table, said: str, forms: dict[str, Rotation], nominal: FloatArray | None
+    table: Table,
+    said: str,
+    forms: dict[str, Rotation],
+    nominal: FloatArray | None,
+    inverts: bool,
 ) -> str:
     """The one form that fits the machine, as words of an error: it is for the user to state."""
     what = "makers mean different angles by them"
@@ -127,6 +136,14 @@ def _told_by(
             hint = f"this machine is fitted by {listed}: --rotation {alike[0]}"
             if len(alike) > 1:
                 hint = f"this machine is fitted by {listed}: state which with --rotation"
+        else:
+            off = {word: misfit(turns.inv(), nominal) for word, turns in forms.items()}
+            best = min(off, key=lambda word: off[word])
+            if off[best] < _FITS:
+                hint = (
+                    f"this machine is fitted by {best} turned round ({_deg(off[best])}):"
+                    f" --rotation {best} {_TURNED[inverts]}"
+                )
     raise table.header_error(f"columns {said}: {what}; {hint}")
 
 
@@ -140,13 +157,13 @@ def _chosen(table: Table, said: str, forms: dict[str, Rotation], rotation: str |
     raise table.header_error(f"columns {said} are not {rotation!r}; expected {', '.join(forms)}")
 
 
-def _inverted(chosen: str, turns: Rotation) -> dict[str, Rotation]:
+def _inverted(chosen: str, turns: Rotation, inverts: bool) -> dict[str, Rotation]:
     """Other meanings that headings of orientations may have."""
-    other = {f"{chosen} of the base in the platform's frame (--invert-poses)": turns.inv()}
+    other = {f"{chosen} turned round ({_TURNED[inverts]})": turns.inv()}
     if chosen == "wxyz":
         other["xyzw"] = Rotation.from_quat(turns.as_quat()[:, [3, 0, 1, 2]])
     if chosen == "matrix":
-        other = {"matrix by columns": turns.inv()}
+        other["matrix by columns"] = turns.inv()
     return other
 
 

@@ -45,7 +45,8 @@ def from_pnp(
     ----------
     measurements : Measurements
         Of kind "pose": the board in axes of the camera (z forward, x right, y down), as
-        ``solvePnP`` and the like find it.
+        ``solvePnP`` and the like find it; of a camera on the platform as `read_measurements` with
+        ``on="platform"`` reads them.
     focal : float
         Focal length of the camera, px.
     board : Board, (width, height) or (width, height, x, y)
@@ -103,8 +104,8 @@ def from_pnp(
         raise ArgumentError(
             f"measurements: in {len(behind)} of {int(read.sum())} rows the board is not before the"
             f" camera (row {row}: z {m.values[row, 2]:.6g} mm): poses have to be those of the board"
-            " in axes of the camera; those of the camera in axes of the board have to be turned"
-            " round (--invert-poses)"
+            " in axes of the camera; --invert-poses (invert_poses=True) is for a file that has"
+            " those of the camera in axes of the board, and for no other"
         )
     pose = np.ascontiguousarray(m.values[read])
     places = _corners(pose, board, corners)

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import pkmcal as pk
+from pkmcal.jobs.inputs import Inputs
+from pkmcal.jobs.read_files import read_file
+from pkmcal.jobs.reading import Reading
 from pkmcal.measurements.inverted import inverted
 from pkmcal.readings import Board, Camera
 from pkmcal.readings.board_poses import board_poses
@@ -111,6 +116,64 @@ def test_a_camera_on_the_platform_has_the_poses_turned_round() -> None:
     there = inverted(pk.from_pnp(poses, FOCAL, BOARD))
     np.testing.assert_array_equal(here.values, there.values)
     np.testing.assert_array_equal(here.sigma, there.sigma)
+
+
+HEADINGS = {
+    "rotvec": ["Rx [rad]", "Ry [rad]", "Rz [rad]"],
+    "quaternion": ["qw", "qx", "qy", "qz"],
+    "matrix": [f"r{i}{j}" for i in "123" for j in "123"],
+}
+
+
+def file_of(form: str, poses: pk.Measurements, path: Path) -> Path:
+    """A file with the orientations of poses in a form."""
+    turns = Rotation.from_euler("xyz", poses.values[:, 3:])
+    columns = {
+        "rotvec": turns.as_rotvec(),
+        "quaternion": turns.as_quat()[:, [3, 0, 1, 2]],
+        "matrix": turns.as_matrix().reshape(-1, 9),
+    }[form]
+    head = [*(f"q{i} [mm]" for i in range(1, 7)), "x [mm]", "y [mm]", "z [mm]", *HEADINGS[form]]
+    table = np.hstack([poses.actuators, poses.values[:, :3], columns])
+    np.savetxt(path, table, delimiter=",", header=",".join(head), comments="")
+    return path
+
+
+@pytest.mark.parametrize("on", ["base", "platform"])
+@pytest.mark.parametrize("form", HEADINGS)
+def test_a_file_of_either_camera_is_read_and_one_that_is_turned_round_is_named(
+    form: str, on: Literal["base", "platform"], tmp_path: Path
+) -> None:
+    """A camera on the platform sees the inverse of what a machine does, and so its file says."""
+    robot = pk.load("hexapod")
+    q = robot.inverse(pk.sample_poses(robot, 30, seed=2))
+    board = pk.screw.from_pose(np.array([0, 0, 1800, 3.0, 0.1, 0.2]))
+    at = pk.screw.from_pose(robot.forward(q).pose)
+    seen = pk.screw.to_pose(board @ (at if on == "base" else np.linalg.inv(at)))
+    poses = pk.Measurements(q, seen, "pose")
+    pnp = Reading(
+        from_pnp="f=1000,board=160x120,middle=0x0", camera_on=on,
+        rotation="rotvec" if form == "rotvec" else None,
+    )  # fmt: skip
+    round_ = replace(pnp, invert_poses=True)
+    as_it_is = file_of(form, poses, tmp_path / "seen.csv")
+    other = file_of(form, inverted(poses), tmp_path / "other.csv")
+
+    def read(path: Path, reading: Reading) -> pk.Measurements:
+        return read_file(str(path), robot, reading, Inputs(), lambda line: None)
+
+    expected = pk.from_pnp(poses, 1000, (160, 120, 0, 0), on=on)
+    for path, reading in ((as_it_is, pnp), (other, round_)):
+        found = read(path, reading)
+        np.testing.assert_allclose(found.values, expected.values, atol=1e-6)
+        np.testing.assert_allclose(found.sigma, expected.sigma, rtol=1e-4, atol=1e-9)
+    with pytest.raises(pk.FileError, match=r"turned round \(--invert-poses\)"):
+        read(other, pnp)
+    with pytest.raises(pk.FileError, match=r"turned round \(without --invert-poses\)"):
+        read(as_it_is, round_)
+    if form == "rotvec":
+        with pytest.raises(pk.FileError, match="--rotation rotvec --invert-poses"):
+            read(other, replace(pnp, rotation=None))
 
 
 def test_a_stand_in_of_the_same_size_weighs_as_the_board_does() -> None:
