@@ -100,6 +100,7 @@ _SYNONYMS: dict[str, str] = {
         for column, noa in enumerate("noa", 1)
     },
 }  # fmt: skip
+_OF_PICTURES = ("camera", "board", "corner")
 _NAMES = {letter: letter for angles in EULER[1:] for letter in angles} | {
     other: name for name, others in _SYNONYMS.items() for other in (name, *others.split("|"))
 }
@@ -235,7 +236,7 @@ def _alone(name: str) -> str:
     small, (head, dot, own) = name.lower(), name.partition(".")
     if head.lower() == OF_A_USER:
         return f"{OF_A_USER}{dot}{own}"
-    return small if small.partition(".")[0] in RESERVED else name
+    return small if small.partition(".")[0] in RESERVED or small in _OF_PICTURES else name
 
 
 def _dotted(name: str) -> str | None:

@@ -10,20 +10,19 @@ import numpy as np
 
 from pkmcal.arguments import word
 from pkmcal.exceptions import ArgumentError, FileError
-from pkmcal.files.csv_table import Table as CsvTable
 from pkmcal.files.number_text import typed
 from pkmcal.files.reading import MOST_ROBOT
 from pkmcal.files.toml_lines import Source
 from pkmcal.files.toml_table import Table
+from pkmcal.jobs.cameras import cameras, with_rows
 from pkmcal.jobs.inputs import Inputs
 from pkmcal.jobs.reading import Reading, named
 from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.measurements.measurement_csv import read_measurements
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.pnp import from_pnp
-from pkmcal.readings.boards import Board
+from pkmcal.measurements.table_layout import layout, open_table
 from pkmcal.readings.camera import Camera, Mount
-from pkmcal.readings.lens import Found
 
 COLUMNS = ("header", "ignore", "rename", "units", "rotation")  # keys of a file of --columns
 _DIGITS = 19  # that no number of a row has
@@ -36,22 +35,16 @@ def read_files(
 
     What was assumed is told, a line each.
     """
-    several = cameras(reading)
-    if len(several) < 2:
-        alone = several[0] if several else None
-        return [read_file(path, robot, reading, inputs, tell, alone)]
-    seen = _named_in(path, reading, inputs)
-    found = [
-        read_file(path, robot, reading, inputs, tell, each)
-        for each in several
-        if not seen or (each.camera_name, each.board_name) in seen
-    ]
-    if not found or not seen:
-        raise ArgumentError(
-            f"{path}: of several cameras or boards it has to name that of each row, in columns"
-            " camera and board"
-        )
-    return found
+    used = cameras(reading)
+    if any(each.camera_name or each.board_name for each in used):
+        _require_table(path)
+        how = _how(reading, inputs)
+        columns = layout(*(how.get(key, ()) for key in ("ignore", "rename", "header", "units")))
+        table = open_table(inputs.file(path), columns, also=(*columns.ignore, *columns.rename))
+        used = with_rows(used, table)
+    if not used:
+        return [read_file(path, robot, reading, inputs, tell)]
+    return [read_file(path, robot, reading, inputs, tell, each) for each in used]
 
 
 def read_file(
@@ -63,13 +56,8 @@ def read_file(
     camera: Camera | None = None,
 ) -> Measurements:
     """Read the measurements of a file; what was assumed is told, a line each."""
-    if Path(path).suffix.lower() in (".toml", ".urdf"):
-        raise FileError(f"{path}: a robot file, where measurements are needed")
-    stated: dict[str, Any] = {} if reading.columns is None else _columns(reading.columns, inputs)
-    stated["ignore"] = [*stated.get("ignore", ()), *reading.ignore]
-    stated["rename"] = stated.get("rename", {}) | reading.names
-    if reading.units is not None:
-        stated["units"] = [unit.strip() for unit in reading.units.split(",")]
+    _require_table(path)
+    stated = _how(reading, inputs)
     if reading.rotation is not None:
         stated["rotation"] = reading.rotation
     if reading.invert_poses:
@@ -94,6 +82,21 @@ def read_file(
         )
     except ArgumentError as error:
         raise ArgumentError(f"--from-pnp: {path}: {error}") from None
+
+
+def _require_table(path: str) -> None:
+    if Path(path).suffix.lower() in (".toml", ".urdf"):
+        raise FileError(f"{path}: a robot file, where measurements are needed")
+
+
+def _how(reading: Reading, inputs: Inputs) -> dict[str, Any]:
+    """Arguments of `read_measurements` that say what columns are."""
+    stated: dict[str, Any] = {} if reading.columns is None else _columns(reading.columns, inputs)
+    stated["ignore"] = [*stated.get("ignore", ()), *reading.ignore]
+    stated["rename"] = stated.get("rename", {}) | reading.names
+    if reading.units is not None:
+        stated["units"] = [unit.strip() for unit in reading.units.split(",")]
+    return stated
 
 
 class Pnp(NamedTuple):
@@ -144,55 +147,6 @@ def read_pnp(text: str) -> Pnp:
     if not min(width, height, focal, 1.0 if noise is None else noise) > 0.0:
         raise ArgumentError(f"--from-pnp {text}: focal length, size and noise must be above 0")
     return Pnp(focal, (width, height, *middle), noise, corners)
-
-
-def cameras(reading: Reading) -> list[Camera]:
-    """The cameras that are stated, each with each board; none without a lens.
-
-    Raises
-    ------
-    ValueError
-        A word that is none, a board without a camera, a lens file that cannot be read, several of
-        which one has no name.
-    """
-    chosen = word("--lens", reading.lens, get_args(Found))
-    mount = word("--camera-on", reading.camera_on, get_args(Mount))
-    if reading.from_pnp is not None and (reading.camera or reading.board):
-        raise ArgumentError(
-            "--from-pnp: of poses f and board say what the camera and the board were; --camera and"
-            " --board go with pixels"
-        )
-    if not reading.camera:
-        if reading.board:
-            raise ArgumentError("--board: it is what a camera sees; state its lens, --camera FILE")
-        return []
-    for option, given in (("--camera", reading.camera), ("--board", reading.board)):
-        names = [name for name, _ in map(named, given)]
-        if len(given) > 1 and ("" in names or len({*names}) < len(names)):
-            raise ArgumentError(f"{option}: name each of several, {option} NAME=…, {option} NAME=…")
-    boards: list[tuple[str, Board | None]] = [("", None)]
-    if reading.board:
-        boards = [(name, Board.parse(text)) for name, text in map(named, reading.board)]
-    return [
-        Camera.from_file(
-            file, on=mount, board=board, lens=chosen, find_size=reading.find_size,
-            size_sigma=reading.size_sigma, camera_name=name, board_name=of_board,
-        )
-        for name, file in map(named, reading.camera)
-        for of_board, board in boards
-    ]  # fmt: skip
-
-
-def _named_in(path: str, reading: Reading, inputs: Inputs) -> set[tuple[str, str]]:
-    """Cameras and boards of the rows of a file, "" where they have no name; none of no column."""
-    table = CsvTable(inputs.file(path))
-    names = {new.lower(): old for old, new in reading.names.items()}
-    columns = [
-        table.texts(column) if column in table.columns else ("",) * len(table)
-        for column in (names.get(word, word) for word in ("camera", "board"))
-    ]
-    found = {*zip(*columns, strict=True)}
-    return set() if found == {("", "")} else found
 
 
 def rows_to_drop(given: Sequence[str], measured: Sequence[Measurements]) -> list[int]:

@@ -103,7 +103,9 @@ def of_names(table: Table, wanted: Mapping[str, str]) -> IntArray:
                 f"column {column!r}: no row of {name!r}; found {', '.join(there)}"
             )
         own &= (texts == name) | (not name)
+    said = " and ".join(f"{column} {name!r}" for column, name in wanted.items() if name)
     if not own.any():
-        said = " and ".join(f"{column} {name!r}" for column, name in wanted.items())
         raise table.header_error(f"there is no row of {said}")
+    if not own.all():
+        table.note(f"read {own.sum()} of {len(own)} rows, those of {said}")
     return np.flatnonzero(own)

@@ -148,17 +148,24 @@ def written(path: Path, sets: list[pk.Measurements], pairs: list[tuple[str, str]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
+LENS_FILE = """%YAML:1.0
+---
+camera_matrix: !!opencv-matrix
+  rows: 3
+  cols: 3
+  dt: d
+  data: [1500, 0, 640, 0, 1500, 400, 0, 0, 1]
+distortion_coefficients: [-0.1, 0, 0, 0, 0]
+"""
+
+
 def test_a_file_of_several_cameras_and_boards_is_calibrated_as_its_sets(
     tmp_path: Path, run: Callable[..., Any], refused: Callable[..., str]
 ) -> None:
     pairs = [("left", "plate"), ("right", "disc")]
     _, sets = drawn(pairs, count=8, of="offset*")
     written(tmp_path / "pixels.csv", sets, pairs)
-    matrix = "camera_matrix: !!opencv-matrix\n  rows: 3\n  cols: 3\n  dt: d\n"
-    lens = f"%YAML:1.0\n---\n{matrix}  data: [1500, 0, 640, 0, 1500, 400, 0, 0, 1]\n"
-    (tmp_path / "lens.yaml").write_text(
-        lens + "distortion_coefficients: [-0.1, 0, 0, 0, 0]\n", encoding="utf-8"
-    )
+    (tmp_path / "lens.yaml").write_text(LENS_FILE, encoding="utf-8")
     told = ["calibrate", "hexapod", tmp_path / "pixels.csv", "--free", "offset*"]
     cameras = [w for name in STANDS for w in ("--camera", f"{name}={tmp_path / 'lens.yaml'}")]
     boards = ["--board", "plate=chessboard:5x4,30", "--board", "disc=chessboard:4x3,40"]
@@ -170,11 +177,48 @@ def test_a_file_of_several_cameras_and_boards_is_calibrated_as_its_sets(
     for name in ("frame.left.x", "frame.right.gamma", "tool.board.disc.y"):
         value = direct.values[direct.free.index(name)]
         assert report["parameters"][name]["value"] == pytest.approx(value, abs=1e-3)
-    alone = ["--camera", tmp_path / "lens.yaml", "--board", "plate=chessboard:5x4,30"]
+    assert "rows, those of camera 'left' and board 'plate'" in result.stderr
+    alone = ["--camera", tmp_path / "lens.yaml", "--board", "chessboard:5x4,30"]
     assert "column 'camera': there are several, left, right" in refused(*told, *alone)
     assert "name each of several" in refused(*told, *cameras[:2], *alone)
     other = ["--camera", f"top={tmp_path / 'lens.yaml'}", *boards[:2]]
-    assert "no row of 'top'" in refused(*told, *other)
+    assert "rows are of 'left', 'right', and --camera names top" in refused(*told, *other)
+
+
+def test_rows_of_a_camera_or_a_board_that_no_option_names_are_refused_with_their_number(
+    tmp_path: Path, refused: Callable[..., str]
+) -> None:
+    """Half of the pictures had been left out without a word."""
+    pixels = tmp_path / "pixels.csv"
+    names = [("left", "plate"), ("left", "disc"), ("right", "plate"), ("right", "disc")]
+    heading = "Camera,BOARD,image,corner,u [px],v [px]," + ",".join(
+        f"q{i} [mm]" for i in range(1, 7)
+    )
+    rows = [f"{camera},{board},1.png,0,600,400" + ",800" * 6 for camera, board in names]
+    pixels.write_text("\n".join([heading, *rows]) + "\n", encoding="utf-8")
+    lens = tmp_path / "lens.yaml"
+    lens.write_text(LENS_FILE, encoding="utf-8")
+
+    def said(cameras: list[str], boards: list[str]) -> str:
+        options = [w for name in cameras for w in ("--camera", f"{name}={lens}")]
+        options += [w for name in boards for w in ("--board", f"{name}=chessboard:5x4,30")]
+        return " ".join(refused("calibrate", "hexapod", pixels, *options).split())
+
+    both = ["plate", "disc"]
+    assert "2 of 4 rows are of 'left', and --camera names links, right." in said(
+        ["links", "right"], both
+    )
+    assert "2 of 4 rows are of 'right', and --camera names left. State --camera right=…" in said(
+        ["left"], both
+    )
+    assert "names LEFT, RIGHT; did you mean 'LEFT'?" in said(["LEFT", "RIGHT"], both)
+    assert "'board': 2 of 4 rows are of 'disc', and --board names plate" in said(
+        ["left", "right"], ["plate"]
+    )
+    pixels.write_text(pixels.read_text(encoding="utf-8").replace("Camera", "Photo"))
+    assert "there are several cameras, left, right, and no column 'camera'" in said(
+        ["left", "right"], both
+    )
 
 
 def test_pictures_at_the_same_actuators_are_of_one_pose_whatever_they_are_called() -> None:
