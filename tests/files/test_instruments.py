@@ -100,7 +100,7 @@ def test_a_quaternion_of_the_inverse_is_named(tmp_path: Path) -> None:
     rows = np.hstack([TRUTH.actuators, TRUTH.poses[:, :3], turned.turns.as_quat()])
     head = ",".join(f"J{i} [mm]" for i in range(1, 7)) + ",x [mm],y [mm],z [mm],qx,qy,qz,qw"
     text = "\n".join([head] + [",".join(f"{v:.9f}" for v in row) for row in rows])
-    with pytest.raises(pk.FileError, match="of the base in the platform"):
+    with pytest.raises(pk.FileError, match=r"turned round \(--invert-poses\)"):
         read(tmp_path, text, ROBOT)
 
 
