@@ -42,7 +42,7 @@ from pkmcal.estimation.held_coefficients import coefficients, of_the_machine, wi
 from pkmcal.estimation.own_residuals import Residual, checked_residuals
 from pkmcal.estimation.parameters import Asked, Bounds, Prior
 from pkmcal.estimation.uncertain_numbers import uncertain_sets
-from pkmcal.estimation.unused_entries import require_used
+from pkmcal.estimation.unused_entries import refuse_stated_by_readings, require_used
 from pkmcal.exceptions import ArgumentError, CalibrationWarning, FitError, UnreachedError
 from pkmcal.fitted.dropped import Drop, left_out
 from pkmcal.geometry.stated_uncertainty import Uncertain, stated_uncertainty
@@ -228,6 +228,7 @@ def identify(
         of_the_machine, coefficients=coefficients(given), names=machine.geometry.names
     )
     named = replace(named, roles=roles_of(given))
+    refuse_stated_by_readings(prior, named, given, machine.geometry.names)
     stated = of_file.with_later(named)
     given, uncertain = uncertain_sets(machine, with_held(given, fixed), stated)
     asked = Asked(

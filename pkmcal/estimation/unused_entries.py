@@ -1,9 +1,13 @@
-"""Entries of a stated uncertainty that would change nothing are refused."""
+"""Entries of a stated uncertainty, or of a prior, that would change nothing are refused."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
+from fnmatch import fnmatchcase
+
 from pkmcal.arguments import did_you_mean
-from pkmcal.estimation.parameters import Parameters
+from pkmcal.estimation.fit_data import FitData
+from pkmcal.estimation.parameters import Parameters, Prior
 from pkmcal.estimation.sessions import matches
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.stated_uncertainty import StatedUncertainty
@@ -45,3 +49,45 @@ def require_used(stated: StatedUncertainty, chosen: Parameters) -> None:
                 f"uncertainty: no reading of these measurements depends on {pattern}"
                 f"{did_you_mean(pattern, chosen.names, listed=0)}"
             )
+
+
+def refuse_stated_by_readings(
+    prior: Prior, stated: StatedUncertainty, datasets: Sequence[FitData], names: Sequence[str]
+) -> None:
+    """Refuse what an instrument of all sets states itself, and what a prior of it is not about.
+
+    Parameters
+    ----------
+    prior : float, mapping or None
+        As `identify` takes it: of numbers that are looked for it is one.
+    stated : StatedUncertainty
+        The argument `uncertainty`.
+    datasets : sequence of FitData
+        The measurements.
+    names : sequence of str
+        Numbers of the geometry.
+
+    Raises
+    ------
+    ValueError
+        Such a name; the message says what states it.
+    """
+    words = [data.measured.instrument.stated_by for data in datasets]
+    of_prior = prior if isinstance(prior, Mapping) else ()
+    of_prior = [pattern for pattern in of_prior if isinstance(pattern, str)]
+    for argument, patterns in (("prior", of_prior), ("uncertainty", stated.patterns)):
+        for pattern in patterns:
+            said = [next((by[own] for own in by if fnmatchcase(pattern, own)), "") for by in words]
+            if not all(said):
+                continue
+            known = [*names, *(_looked_for(datasets) if argument == "prior" else ())]
+            if not any(matches(pattern, name) for name in known):
+                raise ArgumentError(f"{argument}: {pattern}: {said[0]}")
+
+
+def _looked_for(datasets: Sequence[FitData]) -> Iterator[str]:
+    """Names of the numbers beside the geometry of which readings know nothing."""
+    for data in datasets:
+        for dependence in data.dependences():
+            for own in dependence.estimated.values():
+                yield from own.names if own.spread is None else ()

@@ -163,6 +163,14 @@ class Camera(Reading):
     scaled_by: ClassVar[str] = "board"
     unknown_with_target = ("tool",)
     told_apart_by = "name the camera, or the board that stands (camera_name, board_name)"
+    stated_by: ClassVar[Mapping[str, str]] = {
+        "board*size": "size_sigma (--size-sigma) is the prior of a board's size, which is then"
+        " fitted along, and find_size=True (--find-size) finds it from nothing: state one of both",
+        "lens*": "lens_sigma, or deviations in the lens file, is the prior of a lens, which is then"
+        " fitted along, and lens='focal' or 'all' (--lens) finds it: state one of both",
+        "scale": "the board is the length that a camera sees: size_sigma (--size-sigma) states how"
+        " well its size is known",
+    }
     frame_order: ClassVar[int] = 5
     held = (
         HeldNumbers(

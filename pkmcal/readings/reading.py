@@ -144,6 +144,9 @@ class Reading:
         Whether the machine was driven until it touched: a value is then no length that was read.
     told_apart_by : str
         What to state of instruments that stand apart, so that each has a frame of its own.
+    stated_by : mapping of str to str
+        What states how well numbers of the instrument are known, by wildcards of their names: a
+        prior or an uncertainty of these is refused in these words.
     nouns : (str, str) or None
         What one and several are called, where not as the kind and with an s.
     shrinks : bool
@@ -193,6 +196,7 @@ class Reading:
     unknown_with_attachment: ClassVar[tuple[str, ...]] = ()
     by_contact: ClassVar[bool] = False
     told_apart_by: ClassVar[str] = ""
+    stated_by: ClassVar[Mapping[str, str]] = {}
     nouns: ClassVar[tuple[str, str] | None] = None
     shrinks: ClassVar[bool] = False
     more: ClassVar[str] = "measure more poses"

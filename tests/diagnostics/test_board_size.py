@@ -135,6 +135,25 @@ def test_deviations_of_a_size_that_make_no_sense_are_refused(
 
 
 @pytest.mark.parametrize(
+    ("fields", "stated", "words"),
+    [
+        ({}, {"prior": {"board.size": 1e-3}}, "prior: board.size: size_sigma .--size-sigma. is"),
+        ({"size_sigma": 1e-3}, {"prior": {"board.size": 1e-3}}, "state one of both"),
+        ({"size_sigma": 1e-3}, {"uncertainty": {"board.size": 1e-3}}, "uncertainty: board.size: s"),
+        ({"find_size": True}, {"uncertainty": {"board.size": 1e-3}}, "state one of both"),
+        ({}, {"uncertainty": {"scale": 1e-3}}, "the board is the length that a camera sees"),
+        ({}, {"prior": {"lens.fx": 1.0}}, "lens_sigma, or deviations in the lens file, is"),
+    ],
+)
+def test_a_prior_of_a_size_or_a_lens_says_what_states_it(
+    sound: pk.Measurements, fields: dict[str, Any], stated: dict[str, Any], words: str
+) -> None:
+    """It had been called a name that is not known."""
+    with pytest.raises(pk.ArgumentError, match=words):
+        fitted(with_lens(sound, **fields), **stated)
+
+
+@pytest.mark.parametrize(
     ("alone", "known", "harmful", "words"),
     [
         (True, 0.0, np.inf, "how large the machine is rests on the board alone"),
