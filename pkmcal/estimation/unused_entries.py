@@ -73,9 +73,9 @@ def refuse_stated_by_readings(
         Such a name; the message says what states it.
     """
     words = [data.measured.instrument.stated_by for data in datasets]
-    of_prior = prior if isinstance(prior, Mapping) else ()
-    of_prior = [pattern for pattern in of_prior if isinstance(pattern, str)]
-    for argument, patterns in (("prior", of_prior), ("uncertainty", stated.patterns)):
+    of_prior = prior if isinstance(prior, Mapping) else {}
+    named = [name for name in of_prior if isinstance(name, str)]
+    for argument, patterns in (("prior", named), ("uncertainty", stated.patterns)):
         for pattern in patterns:
             said = [next((by[own] for own in by if fnmatchcase(pattern, own)), "") for by in words]
             if not all(said):

@@ -406,9 +406,12 @@ class Table:
         column_unit = {"rad": "deg"}.get(quantities[0], quantities[0])
         stated = column.unit or self._stated(name, column, (expected,) if expected else quantities)
         if not stated:
+            option = f"--rename '{column.name}={column.name} [{column_unit}]'"
+            if units.quantity_of(column_unit):
+                option = f"--units {column_unit} for all columns without one"
             raise self.header_error(
                 f"column {column.name!r} has no unit: expected '{column.name} [{quantities[0]}]'"
-                f" (or another of {usual}), or --units {column_unit} for all columns without one",
+                f" (or another of {usual}), or {option}",
                 column,
             )
         unit = units.plain(stated, known)

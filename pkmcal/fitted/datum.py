@@ -185,8 +185,8 @@ def _still(twists: FloatArray, length: float, *frames: FloatArray) -> FloatArray
     rows = rows[np.isfinite(rows).all(axis=(1, 2))]
     rows[:, :3] *= length
     rows[:, :, p:] /= np.tile([length] * 3 + [1.0] * 3, len(frames))
-    singular, directions = decompose(rows.reshape(-1, rows.shape[2]))
-    still: FloatArray = directions[:p, singular <= ROUNDING * singular[0]]
+    singular, directions = decompose(rows.reshape(rows.shape[0] * 6, rows.shape[2]))
+    still: FloatArray = directions[:p, singular <= ROUNDING * singular.max(initial=0.0)]
     return still
 
 

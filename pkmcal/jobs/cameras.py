@@ -35,6 +35,7 @@ def cameras(reading: Reading) -> list[Camera]:
     if not reading.camera:
         if reading.board:
             raise ArgumentError("--board: it is what a camera sees; state its lens, --camera FILE")
+        _require_none_of_pixels(reading)
         return []
     for option, given in (("--camera", reading.camera), ("--board", reading.board)):
         names = [name for name, _ in map(named, given)]
@@ -51,6 +52,21 @@ def cameras(reading: Reading) -> list[Camera]:
         for name, file in map(named, reading.camera)
         for of_board, board in boards
     ]  # fmt: skip
+
+
+def _require_none_of_pixels(reading: Reading) -> None:
+    """Refuse options that say nothing without a camera."""
+    given = {
+        "--camera-on": reading.camera_on != "base" and reading.from_pnp is None,
+        "--lens": reading.lens != "none",
+        "--find-size": reading.find_size,
+        "--size-sigma": reading.size_sigma != 0.0,
+    }
+    for option, is_given in given.items():
+        if is_given:
+            raise ArgumentError(
+                f"{option}: it is of pixels that a camera saw; state its lens, --camera FILE"
+            )
 
 
 def with_rows(stated: Sequence[Camera], table: Table) -> list[Camera]:

@@ -74,6 +74,8 @@ def read_file(
     )
     for note in measured.notes:
         tell(note)
+    if reading.units and all(each.unit_from != "options" for each in measured.understood):
+        tell(f"{path}: --units {reading.units} has no effect: every column that is read has a unit")
     if pnp is None:
         return measured
     try:

@@ -225,6 +225,14 @@ def test_a_number_with_a_prior_or_bounds_is_not_held() -> None:
     assert (tied.base, tied.platform) == (0, 6)
 
 
+def test_a_datum_of_frames_alone_holds_nothing() -> None:
+    robot = pk.load("hexapod")
+    q = robot.inverse(pk.sample_poses(robot, 12, seed=1))
+    measured = pk.VirtualMachine(robot, 0.01).measure(q, "pose")
+    found = pk.identify(robot, measured, [], unknown=["frame", "target"], fix="datum")
+    assert not found.datum.names and len(found.free) == 12
+
+
 def test_numbers_that_are_fixed_are_no_parameters() -> None:
     robot, rng = pk.load("hexapod"), np.random.default_rng(2)
     readings = measured(robot, actuators("hexapod", 30, 3), rng)

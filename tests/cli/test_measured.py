@@ -62,6 +62,30 @@ def test_columns_are_described_in_a_file(run: Any, refused: Any) -> None:
     )
 
 
+def test_options_that_say_nothing_of_what_is_read_are_refused_or_said(
+    run: Any, refused: Any
+) -> None:
+    probe = ("calibrate", DELTA / "robot.toml", DELTA / "probe.csv")
+    for given in (
+        ("--size-sigma", "0.001"), ("--find-size",), ("--lens", "all"), ("--camera-on", "platform"),
+    ):  # fmt: skip
+        said = refused(*probe, *given)
+        assert (
+            said == f"{given[0]}: it is of pixels that a camera saw; state its lens, --camera FILE"
+        )
+    done = run(*probe, "--units", "deg")
+    assert "--units deg has no effect: every column that is read has a unit" in done.stderr
+    actuators = ",".join(f"q{i} [mm]" for i in range(1, 7))
+    Path("pixels.csv").write_text(f"corner,u,v,{actuators}\n0,1,2" + ",800" * 6 + "\n")
+    Path("lens.yaml").write_text(
+        "camera_matrix: [[1000, 0, 500], [0, 1000, 400], [0, 0, 1]]\n"
+        "distortion_coefficients: [0, 0, 0, 0, 0]\n"
+    )
+    seen = ("calibrate", "hexapod", "pixels.csv", "--camera", "lens.yaml", "--board")
+    said = refused(*seen, "chessboard:5x4,30")
+    assert "column 'u' has no unit" in said and said.endswith("or --rename 'u=u [px]'")
+
+
 def test_a_probes_log_that_contradicts_itself_is_not_trusted(run: Any) -> None:
     """Heights that the robot file gives itself: written, and exit code 1."""
     robot = pk.load(DELTA / "robot.toml")
