@@ -27,6 +27,7 @@ from pkmcal.calibration.steps import (
     require_agreement,
     result,
     solve,
+    that_others_contradict,
     with_component_noise,
     with_datum,
     without_outliers,
@@ -264,6 +265,8 @@ def identify(
             if isinstance(error, UnreachedError):
                 hint = contradicting(rows.fitted, error.rows)
             hint = hint or likely_mistakes(rows.fitted, chosen, start)
+            if not hint and start is not None and start.ok and not drop_outliers:
+                hint = that_others_contradict(rows, equations, start)
             if not hint and start is not None and not start.ok:
                 hint = [
                     "check units, signs and columns of their actuators, or leave these rows out"

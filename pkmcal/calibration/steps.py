@@ -16,6 +16,7 @@ import numpy as np
 
 from pkmcal.arms.arm import SerialArm
 from pkmcal.calibration.identification import Identification
+from pkmcal.diagnostics.check import Remedy
 from pkmcal.diagnostics.row_errors import contradicting
 from pkmcal.estimation import solving
 from pkmcal.estimation.begin import begun, estimator_at
@@ -221,6 +222,19 @@ def _contradicted(
     machine = equations.with_parameters(there.parameters).with_exact_actuators()
     there = in_their_modes(machine, machine.at(there.theta, near=start.states))
     return far_off(equations, there, TIMES)
+
+
+def that_others_contradict(rows: Rows, equations: Equations, start: Evaluation) -> list[str]:
+    """Name the few rows that a robust fit leaves out, where that of all rows ran astray."""
+    odd: tuple[int, ...] = ()
+    with suppress(ArgumentError):
+        odd = robust_outliers(equations, start)
+    if not odd or not are_few(rows.fitted, odd):
+        return []
+    return [
+        f"{row_names(rows.fitted, odd)}: the others contradict what was read there, as of another"
+        f" row's actuators; leave these rows out with {Remedy('drop', 'outliers')}"
+    ]
 
 
 def without_slack(equations: Equations, start: Evaluation) -> tuple[Equations, tuple[Cell, ...]]:

@@ -242,6 +242,25 @@ def test_a_camera_that_is_pointed_at_the_board_tells_its_middle() -> None:
     np.testing.assert_allclose(guessed, told, rtol=1e-6, atol=1e-12)
 
 
+@pytest.mark.parametrize(("seed", "one", "other"), [(0, 19, 23), (1, 1, 27)])
+def test_rows_that_are_exchanged_are_named_where_the_search_runs_astray(
+    seed: int, one: int, other: int
+) -> None:
+    """It had ended at a type-2 singular pose, and no row was named."""
+    _, measured = pictures(seed)
+    poses = of_pictures(measured)
+    values = poses.values.copy()
+    values[[one, other]] = values[[other, one]]
+    exchanged = pk.from_pnp(replace(poses, values=values), FOCAL, BOARD, noise=NOISE)
+    try:
+        said = str(fitted(exchanged, **UNKNOWN).verdict)
+    except pk.ArgumentError as error:
+        said = str(error)
+    said = " ".join(said.split())
+    assert f"row {one}, row {other}" in said and "--drop-outliers" in said
+    assert fitted(exchanged, drop="outliers", **UNKNOWN).dropped == (one, other)
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
