@@ -27,7 +27,6 @@ from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.free_parameters import parameters
 from pkmcal.estimation.loss import LossName
-from pkmcal.estimation.mode_slips import in_their_modes
 from pkmcal.estimation.other_starts import likelier_start
 from pkmcal.estimation.own_classes import require_true
 from pkmcal.estimation.parameters import Parameters
@@ -35,8 +34,9 @@ from pkmcal.estimation.pose_minima import solved_in_least_minima
 from pkmcal.estimation.starts import stated_beside
 from pkmcal.estimation.unlike_components import unlike_components
 from pkmcal.exceptions import ArgumentError, UnreachedError
+from pkmcal.fitted.contradicted import contradicted, far_off
 from pkmcal.fitted.datum import datum as choose_datum
-from pkmcal.fitted.dropped import TIMES, are_few, far_off, held_without, robust_outliers, without
+from pkmcal.fitted.dropped import are_few, held_without, robust_outliers, without
 from pkmcal.fitted.fit import Fit
 from pkmcal.fitted.fit_statistics import (
     identifiability,
@@ -218,10 +218,7 @@ def _contradicted(
     if not far or not are_few(rows.fitted, far):
         return ()
     others = begin(rows.without(far), chosen, loss)
-    there = solved_in_least_minima(estimator_at(*others, loss)).evaluation
-    machine = equations.with_parameters(there.parameters).with_exact_actuators()
-    there = in_their_modes(machine, machine.at(there.theta, near=start.states))
-    return far_off(equations, there, TIMES)
+    return contradicted(equations, start, solved_in_least_minima(estimator_at(*others, loss)))
 
 
 def that_others_contradict(rows: Rows, equations: Equations, start: Evaluation) -> list[str]:

@@ -11,14 +11,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pkmcal.diagnostics.check import RARE, Check, Remedy
+from pkmcal.diagnostics.check import CHANCE, Check, Remedy
 from pkmcal.display import chance_text
 from pkmcal.estimation.identifiability import listed, shown_beyond
 from pkmcal.fitted.machine_accuracy import times_stated
 from pkmcal.fitted.solution import Solution
 from pkmcal.statistics.score_test import beside, columns_of
 
-_SHARED = 0.01  # chance, by errors that rows of a pose share, below which readings contradict
+_SHARED = 0.05  # chance, by errors that rows of a pose share, below which readings contradict
 _HARMFUL = 0.5  # times its ± by which the held combinations move the machine
 _PART = 0.3  # of the largest, from which a number is named
 _NAMED = 4
@@ -58,7 +58,7 @@ def held_combinations(found: Solution) -> Held | None:
         return None
     columns = fit.estimator.own_jacobian(estimate.evaluation, sure.factors) @ held
     taken = beside(found.weighed.fit, found.weighed.columns(columns_of(columns)))
-    if taken is None or taken.chance >= RARE:
+    if taken is None or taken.chance >= CHANCE:
         return None
     score = taken.score()
     if score is None or score.chance >= _SHARED:

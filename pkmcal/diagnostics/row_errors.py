@@ -37,8 +37,9 @@ def contradicting(datasets: Sequence[FitData], rows: Sequence[int]) -> list[str]
         return []
     return [
         f"{row_names(datasets, rows)}: what was read there contradicts the actuators, as where they"
-        " are of another row, or a picture is mirrored, or numbered from the other end of its"
-        " board; leave these rows out with"
+        " are of another row, a picture is mirrored or numbered from the other end of its board,"
+        " the instrument stood elsewhere, or its lens is another at the edge of pictures; leave"
+        " these rows out with"
         f" {Remedy('drop', 'outliers')}"
     ]
 

@@ -9,6 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import identity
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.diagnostics.cause_columns import of_instruments_alone
@@ -24,6 +27,7 @@ from pkmcal.statistics.linear_fit import LinearFit
 from pkmcal.statistics.score_test import Beside, beside
 
 _HARMFUL = 0.25  # times its ± by which such errors move a machine; smooth ones do so more
+_SAME = 1e-3  # of the way of each actuator, within which two pictures are at one pose
 _ALIKE = 2.3  # deviations: a chance of 1 in 100
 _READINGS = 4  # of a point, from which its own error is told from noise
 _MOST = 400  # points that are tested
@@ -82,7 +86,9 @@ def _alike_everywhere(fit: Fit, taken: Beside) -> float:
     Pictures at one pose may share errors of finding corners, which are those of no other pose.
     """
     blocks = fit.uncertainty.blocks
-    places = np.unique(blocks.table.actuators, axis=0, return_inverse=True)[1].reshape(-1)
+    at = blocks.table.actuators / np.maximum(np.ptp(blocks.table.actuators, axis=0), 1e-300)
+    near = cKDTree(at).sparse_distance_matrix(cKDTree(at), _SAME, p=np.inf)
+    places = connected_components(near + identity(len(at)), directed=False)[1]
     place = np.repeat(places[blocks.pose_of_block], blocks.components)
     told = np.zeros((int(places.max()) + 1, len(taken.along)))
     np.add.at(told, place, taken.own * taken.fit.residual[:, None])

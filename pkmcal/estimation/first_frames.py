@@ -123,8 +123,9 @@ def _with_carried(
     frame = (known or list(groups))[0]
     parts = []
     for i, rows in groups[frame]:
-        m, at = prediction.table.sets[i], evaluation.pose[prediction.table.pose_of[i]]
-        parts.append((m.instrument.places_seen(m, at)[rows], at[rows]))
+        m = prediction.table.sets[i].select(rows)  # others may be of another session
+        at = evaluation.pose[prediction.table.pose_of[i][rows]]
+        parts.append((m.instrument.places_seen(m, at), at))
     values, pose = (np.concatenate(each) for each in zip(*parts, strict=True))
     if frame is None:
         return {thing: of_tool(values, pose)}
@@ -167,7 +168,8 @@ def _read(prediction: Prediction, evaluation: Evaluation, i: int, rows: IntArray
     if prediction.carried_columns(i) is None:
         return m.values[rows]
     at = evaluation.pose[prediction.table.pose_of[i]]
-    seen: FloatArray = m.instrument.places_seen(m, at)[rows]
+    mine = m.select(rows)
+    seen: FloatArray = mine.instrument.places_seen(mine, at[rows])
     return seen
 
 

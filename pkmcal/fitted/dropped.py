@@ -15,7 +15,6 @@ from pkmcal.estimation.estimate import Estimate
 from pkmcal.estimation.estimator import Estimator
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.fit_data import FitData
-from pkmcal.estimation.misfits import worst_readings
 from pkmcal.estimation.pose_minima import solved_in_least_minima
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.fitted.outliers import LARGE, outliers
@@ -24,8 +23,6 @@ Found = Literal["outliers", "slack"]
 Drop = Found | Sequence[int | Found] | None
 FOUND: tuple[Found, ...] = ("outliers", "slack")
 _FEW = 0.25  # share of the rows; where more disagree it is rather units or columns
-_FAR = 0.01  # of the largest length, by which poses are far off
-_SEEM, TIMES = 3.0, 10.0  # times the median, by which they are: before a fit, and by others' fit
 _WANTED = "'outliers', 'slack' or numbers of rows"
 
 
@@ -138,21 +135,6 @@ def are_few(datasets: Sequence[FitData], rows: Sequence[int]) -> bool:
     mine = [np.isin(data.rows, rows) for data in datasets]
     whole = np.concatenate(mine)
     return bool(whole.mean() <= _FEW and not any(each.all() for each in mine))
-
-
-def far_off(equations: Equations, start: Evaluation, times: float = _SEEM) -> tuple[int, ...]:
-    """Numbers of the rows of poses that contradict their actuators before anything is fitted.
-
-    Of poses at which much was read, those that are far off where most are near.
-    """
-    much = (equations.blocks.components >= LARGE).any()
-    if equations.system is None or not (much and start.ok):
-        return ()
-    off = worst_readings(equations, start.residuals)
-    usual = float(np.nanmedian(off)) if np.isfinite(off).any() else np.inf
-    odd = np.flatnonzero(off > max(times * usual, _FAR * equations.size))
-    whole = [np.isin(place, odd) for place in equations.table.pose_of]
-    return tuple(equations.table.rows[np.concatenate(whole)].tolist())
 
 
 def robust_outliers(equations: Equations, start: Evaluation) -> tuple[int, ...]:
