@@ -20,7 +20,7 @@ from pkmcal.fitted.outliers import LARGE
 
 _FAR = 0.01  # of the largest length, by which poses are far off
 _SEEM, _TIMES = 3.0, 10.0  # times the median, by which they are: at the start, and by others' fit
-_SURE = 8.0  # deviations of what is predicted there
+_SURE = 5.0  # deviations of what is predicted there
 
 
 def far_off(equations: Equations, start: Evaluation) -> tuple[int, ...]:

@@ -11,10 +11,11 @@ import pytest
 import pkmcal as pk
 from pkmcal.fitted.dropped import are_few
 
-from ..diagnostics.test_pictures import BOARD, checks, pictures
+from ..diagnostics.test_pictures import BOARD, LENS, checks, pictures
 
 CORNERS = len(BOARD.ids)
 ODD = 7
+MOUNTED: Any = {"stands": [-150, 120, 1950, 3.0, 0.1, 0.2], "carried": [-90, 70, 20, np.pi, 0, 0.3]}
 
 
 def mirrored(count: int, odd: list[int]) -> pk.Measurements:
@@ -56,3 +57,37 @@ def test_rows_that_are_many_or_all_of_a_set_are_no_outliers() -> None:
     assert are_few(sets, [1, 4])
     assert not are_few(sets, [1, 4, 5]) and not are_few(sets, [0, 1, 2, 3])
     assert not are_few([Set([0]), Set(list(range(1, 20)))], [0])  # type: ignore[list-item]
+
+
+def test_a_board_that_is_fastened_anew_in_few_pictures_is_one_of_its_session() -> None:
+    """Its pictures are judged by themselves: by those of the others it is 60 mm off."""
+    sound = pictures(24)
+    session = np.where(sound.group >= 20, "b", "a")
+    corner = np.array(sound.instrument.corner)
+    corner[session == "b"] += [25.0, -15.0, 0.0]  # where it is fastened now
+    robot = pk.load("hexapod")
+    seen = pk.VirtualMachine(robot, 0.1, 1).measure(
+        sound.actuators, replace(sound.instrument, corner=corner, **MOUNTED)
+    )
+    measured = replace(seen, instrument=sound.instrument, group=sound.group, session=session)
+    found, _ = checks(measured, per_session="tool*")
+    assert found.verdict.state == "calibrated"
+    tools = dict(zip(found.free, found.values, strict=True))
+    moved = [tools[f"tool.board.{axis}@b"] - tools[f"tool.board.{axis}@a"] for axis in "xyz"]
+    assert np.linalg.norm(moved) == pytest.approx(np.hypot(25.0, 15.0), abs=2.0)
+
+
+def test_a_picture_at_the_edge_of_a_lens_that_is_found_contradicts_no_other() -> None:
+    """All others are in the middle of the picture, where they tell little of its edge."""
+    robot, random = pk.load("hexapod"), np.random.default_rng(0)
+    names = robot.geometry.match(["base*", "platform*", "offset*"])
+    true = robot.replace({n: robot.geometry[n] + random.normal(0.0, 0.3) for n in names})
+    camera = pk.readings.Camera(**{**LENS, "k1": -0.3, "k2": 0.12}, **MOUNTED)
+    near = np.array(pk.sample_poses(robot, 9, seed=1, share=0.08))
+    near[-1, :2] = [-330.0, 150.0]
+    at, seeing = camera.seeing(robot.inverse(near), BOARD)
+    seen = pk.VirtualMachine(true, 0.1, 2).measure(at, seeing)
+    start = replace(seen.instrument, k1=0.0, k2=0.0, lens="all")
+    measured = replace(seen, instrument=start, group=np.repeat(np.arange(9), CORNERS))
+    found, _ = checks(measured, drop="outliers")
+    assert not found.dropped

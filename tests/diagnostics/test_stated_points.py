@@ -67,13 +67,17 @@ def test_sound_corners_are_not_doubted(sound: pk.Measurements, seed: int) -> Non
 
 
 def test_errors_that_pictures_at_one_pose_share_are_none_of_the_board() -> None:
-    """Four pictures at each of eight poses: how corners were found there is repeated with them."""
+    """Four pictures at each of eight poses: how corners were found there is repeated with them.
+
+    Encoders read a little else each time.
+    """
     random, base = np.random.default_rng(0), pictures(8)
     shared = base.values + random.normal(0.0, 0.07, base.values.shape)
     corner = np.tile(np.asarray(base.instrument.corner), (4, 1))
     assert base.group is not None
     repeated = pk.Measurements(
-        np.tile(base.actuators, (4, 1)),
+        np.tile(base.actuators, (4, 1))
+        + np.repeat(random.normal(0.0, 1e-3, (32, 6)), len(BOARD.ids), axis=0)[: 4 * len(base)],
         np.tile(shared, (4, 1)) + random.normal(0.0, 0.03, (4 * len(base), 2)),
         replace(base.instrument, corner=corner),
         group=np.concatenate([base.group + 100 * i for i in range(4)]),
