@@ -36,7 +36,7 @@ from pkmcal.estimation.unlike_components import unlike_components
 from pkmcal.exceptions import ArgumentError, UnreachedError
 from pkmcal.fitted.contradicted import contradicted, far_off
 from pkmcal.fitted.datum import datum as choose_datum
-from pkmcal.fitted.dropped import are_few, held_without, robust_outliers, without
+from pkmcal.fitted.dropped import are_few, held_without, leaves_none, robust_outliers, without
 from pkmcal.fitted.fit import Fit
 from pkmcal.fitted.fit_statistics import (
     identifiability,
@@ -215,7 +215,7 @@ def _contradicted(
 ) -> tuple[int, ...]:
     """Rows of a few poses that are far off, by the machine which all others agree on, too."""
     far = far_off(equations, start)
-    if not far or not are_few(rows.fitted, far):
+    if not far or not are_few(rows.fitted, far) or leaves_none(rows.fitted, far):
         return ()
     others = begin(rows.without(far), chosen, loss)
     return contradicted(equations, start, solved_in_least_minima(estimator_at(*others, loss)))

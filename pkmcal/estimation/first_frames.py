@@ -123,9 +123,8 @@ def _with_carried(
     frame = (known or list(groups))[0]
     parts = []
     for i, rows in groups[frame]:
-        m = prediction.table.sets[i].select(rows)  # others may be of another session
-        at = evaluation.pose[prediction.table.pose_of[i][rows]]
-        parts.append((m.instrument.places_seen(m, at), at))
+        at = evaluation.pose[prediction.table.pose_of[i]]
+        parts.append((_places_seen(prediction.table.sets[i], at, rows), at[rows]))
     values, pose = (np.concatenate(each) for each in zip(*parts, strict=True))
     if frame is None:
         return {thing: of_tool(values, pose)}
@@ -167,9 +166,18 @@ def _read(prediction: Prediction, evaluation: Evaluation, i: int, rows: IntArray
     m = prediction.table.sets[i]
     if prediction.carried_columns(i) is None:
         return m.values[rows]
-    at = evaluation.pose[prediction.table.pose_of[i]]
+    return _places_seen(m, evaluation.pose[prediction.table.pose_of[i]], rows)
+
+
+def _places_seen(m: Measurements, at: FloatArray, rows: IntArray) -> FloatArray:
+    """Places by some rows alone, for others may be of another session; by all if they are few."""
     mine = m.select(rows)
-    seen: FloatArray = mine.instrument.places_seen(mine, at[rows])
+    try:
+        seen: FloatArray = mine.instrument.places_seen(mine, at[rows])
+    except ArgumentError:
+        if len(mine) == len(m):
+            raise
+        seen = m.instrument.places_seen(m, at)[rows]
     return seen
 
 

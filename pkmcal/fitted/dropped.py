@@ -137,6 +137,17 @@ def are_few(datasets: Sequence[FitData], rows: Sequence[int]) -> bool:
     return bool(whole.mean() <= _FEW and not any(each.all() for each in mine))
 
 
+def leaves_none(datasets: Sequence[FitData], rows: Sequence[int]) -> bool:
+    """Return whether nothing is left of a session, of whose own numbers others say nothing."""
+    gone = [np.isin(data.rows, rows) for data in datasets]
+    named = [
+        np.full(len(each), "") if data.measured.session is None else data.measured.session
+        for data, each in zip(datasets, gone, strict=True)
+    ]
+    left = {*np.concatenate([own[~each] for own, each in zip(named, gone, strict=True)]).tolist()}
+    return not {*np.concatenate(named).tolist()} <= left
+
+
 def robust_outliers(equations: Equations, start: Evaluation) -> tuple[int, ...]:
     """Numbers of the rows that a robust fit from this start finds outlying."""
     estimator = estimator_at(equations, start, "cauchy")

@@ -80,7 +80,7 @@ def instruments(
             if at and behind in (name, data.set_name):
                 numbers[stem] = by_name[f"{stem}@{behind}"]
         rows = np.flatnonzero(kept == name)
-        yield rows, data.measured.instrument.as_found(numbers)
+        yield rows, data.measured.select(rows).instrument.as_found(numbers)
 
 
 def pictures(found: Solution) -> Iterator[CalibratedPicture]:

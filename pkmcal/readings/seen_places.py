@@ -354,9 +354,10 @@ def _require_own_poses(seen: FloatArray, pose: FloatArray, names: Sequence[str])
     odd = np.flatnonzero(off > most)
     if not 1 <= len(odd) <= len(seen) / 4:
         return odd[:0]
-    each = np.stack([_apart(seen[odd], laid[np.full(len(odd), other)]) for other in odd], axis=1)
+    each = np.stack([_apart(seen, laid[np.full(len(seen), other)])[odd] for other in odd], axis=1)
     of, least = each.argmin(axis=1), each.min(axis=1)
-    if np.array_equal(np.sort(of), np.arange(len(odd))) and (least <= most).all():
+    own = of == np.arange(len(odd))
+    if np.array_equal(np.sort(of), np.arange(len(odd))) and not own.any() and (least <= most).all():
         pairs = zip(odd.tolist(), odd[of].tolist(), strict=True)
         which = ", ".join(f"{names[i]} shows {names[k]}" for i, k in pairs)
         raise ArgumentError(

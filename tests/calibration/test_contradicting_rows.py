@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal.fitted.dropped import are_few
+from pkmcal.fitted.dropped import are_few, leaves_none
 
 from ..diagnostics.test_pictures import BOARD, LENS, checks, pictures
 
@@ -46,9 +46,18 @@ def test_pictures_that_contradict_all_others_are_outliers(count: int, odd: list[
     assert len(found.dropped) == len(odd) * CORNERS and found.verdict.state == "calibrated"
 
 
+class Measured(NamedTuple):
+    session: np.ndarray | None
+
+
 @dataclass
 class Set:
     rows: list[int]
+    sessions: list[str] | None = None
+
+    @property
+    def measured(self) -> Measured:
+        return Measured(None if self.sessions is None else np.array(self.sessions))
 
 
 def test_rows_that_are_many_or_all_of_a_set_are_no_outliers() -> None:
@@ -91,3 +100,26 @@ def test_a_picture_at_the_edge_of_a_lens_that_is_found_contradicts_no_other() ->
     measured = replace(seen, instrument=start, group=np.repeat(np.arange(9), CORNERS))
     found, _ = checks(measured, drop="outliers")
     assert not found.dropped
+
+
+def test_a_small_session_with_numbers_of_the_machine_is_judged_by_its_own() -> None:
+    """Of what an actuator was set to then the others say nothing."""
+    robot, sound = pk.load("hexapod"), pictures(20)
+    session = np.where(sound.group >= 17, "b", "a")
+    before, later = robot, robot.replace({"offset1": robot.geometry["offset1"] + 30.0})
+    camera = replace(sound.instrument, **MOUNTED)
+    seen = [
+        pk.VirtualMachine(true, 0.1, 3).measure(sound.actuators, camera).values
+        for true in (before, later)
+    ]
+    values = np.where((session == "b")[:, None], seen[1], seen[0])
+    measured = replace(sound, values=values, session=session)
+    found, _ = checks(measured, per_session=["offset1"])
+    offsets = dict(zip(found.free, found.values, strict=True))
+    assert offsets["offset1@b"] - offsets["offset1@a"] == pytest.approx(30.0, abs=1.0)
+
+
+def test_rows_of_a_session_that_is_far_off_as_a_whole_leave_nothing_of_it() -> None:
+    sets: Any = [Set([0, 1, 2, 3], ["a", "a", "b", "b"]), Set([4, 5, 6, 7], None)]
+    assert leaves_none(sets, [2, 3]) and leaves_none(sets, [0, 1, 2])
+    assert not leaves_none(sets, [0, 2]) and not leaves_none(sets, [4, 5])

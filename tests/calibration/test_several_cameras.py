@@ -299,3 +299,23 @@ def test_single_points_that_tell_no_camera_are_refused() -> None:
     _, sets = markers(Board.points([0], [[0, 0, 0]]), 0.0)
     with pytest.raises(pk.ArgumentError, match="state the corners of a marker as a board"):
         fitted([sets[0].select(np.arange(5))])
+
+
+def test_a_small_session_of_single_points_is_laid_by_the_pictures_of_all() -> None:
+    """Three places tell no camera; it stands where it stood, the marker was fastened anew."""
+    _, sets = markers(Board.points([0], [[0, 0, 0]]), 0.0, poses=14)
+    session = np.where(np.arange(14) >= 11, "b", "a")
+    found = fitted(
+        [replace(each, session=session) for each in sets], free="offset*", per_session="tool*"
+    )
+    assert "tool.board.a.x@b" in found.free and found.rms < 0.1
+
+
+def test_pictures_of_two_cameras_in_sessions_have_a_verdict_and_a_table() -> None:
+    _, sets = drawn([("left", "plate"), ("right", "plate")], count=14, of="offset*")
+    named = [
+        replace(each, session=np.where(each.group % 14 >= 7, "b", "a"))  # type: ignore[operator]
+        for each in sets
+    ]
+    found = fitted(named, free="offset*", per_session="frame*")
+    assert found.verdict.state == "calibrated" and len(found.pictures) == 28
