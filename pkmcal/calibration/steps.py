@@ -16,7 +16,6 @@ import numpy as np
 
 from pkmcal.arms.arm import SerialArm
 from pkmcal.calibration.identification import Identification
-from pkmcal.diagnostics.check import Remedy
 from pkmcal.diagnostics.row_errors import contradicting
 from pkmcal.estimation import solving
 from pkmcal.estimation.begin import begun, estimator_at
@@ -226,12 +225,7 @@ def that_others_contradict(rows: Rows, equations: Equations, start: Evaluation) 
     odd: tuple[int, ...] = ()
     with suppress(ArgumentError):
         odd = robust_outliers(equations, start)
-    if not odd or not are_few(rows.fitted, odd):
-        return []
-    return [
-        f"{row_names(rows.fitted, odd)}: the others contradict what was read there, as of another"
-        f" row's actuators; leave these rows out with {Remedy('drop', 'outliers')}"
-    ]
+    return contradicting(rows.fitted, odd) if odd else []
 
 
 def without_slack(equations: Equations, start: Evaluation) -> tuple[Equations, tuple[Cell, ...]]:
